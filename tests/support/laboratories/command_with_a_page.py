@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from support.processes.waiting import wait_for
+from support.processes.waiting import alive, wait_for
 from support.processes.warm import start_module
 
 ADDRESS_PREFIX = "page: "
@@ -19,7 +19,7 @@ def start_with_page(log: Path, *words: str | Path) -> Iterator[tuple["subprocess
         start_module(*words, stdin=subprocess.DEVNULL, stdout=file, stderr=file) as process,
     ):
         try:
-            yield process, wait_for(lambda: _address(log), "its page")
+            yield process, wait_for(lambda: _address(log), "its page", meanwhile=alive(process))
         finally:
             process.kill()
 
