@@ -14,7 +14,7 @@ JUDGED_FRACTION, MIN_INTERPOLATED_FRACTION = 0.25, 0.4  # fastest rows, and the 
 MAX_BEND_RATIO = 0.1  # distance from the chord, relative to that of a unit quaternion
 ROUNDING = 2e-6  # distance from the chord of a number with six decimals
 MIN_SHORT_RATIO = 10.0  # lack of length of an interpolated row, relative to that of the slowest rows
-MAX_LENGTH_ERROR = 1e-3
+MAX_LENGTH_ERROR, MIN_CHORD = 1e-3, 1e-3
 MIN_ROWS = 20
 
 
@@ -35,10 +35,10 @@ def find_interpolated(time_s: Array, quaternions: Array) -> NDArray[np.bool_]:
     usual = max(float(np.quantile(np.abs(lacks[1:-1][lengths <= slow]), 1 - JUDGED_FRACTION)), ROUNDING)
     is_straight, is_short = distances <= MAX_BEND_RATIO * bends, lacks[1:-1] > MIN_SHORT_RATIO * usual
     judged = np.array([is_straight.any(axis=0), is_short])[:, lengths >= fast]
-    if judged.mean(axis=1).max() >= MIN_INTERPOLATED_FRACTION:
+    if fast > MIN_CHORD and judged.mean(axis=1).max() >= MIN_INTERPOLATED_FRACTION:
         lies_on = (distances <= np.maximum(MAX_BEND_RATIO * bends, ROUNDING)).any(axis=0)
         interpolated[1:-1] = lies_on & (lengths > ROUNDING)
-        interpolated |= np.abs(lacks) > MAX_LENGTH_ERROR
+        interpolated |= lacks > MAX_LENGTH_ERROR
     return interpolated
 
 

@@ -64,6 +64,14 @@ def test_a_steady_turn_and_a_long_rest_are_measured() -> None:
     assert not find_interpolated(time_s, np.round(quaternions, 7)).any()
 
 
+@pytest.mark.parametrize("length", [0.99, 1.01])
+def test_quaternions_of_another_length_are_not_left_out_as_interpolated(length: float) -> None:
+    recorded = record(replace(LOG, poses_hz=100), 5)
+    quaternions = length * Rotation.from_matrix(recorded.attitudes).as_quat(scalar_first=True)
+    for rows in (quaternions, np.tile(quaternions[0], (50, 1))):
+        assert not find_interpolated(recorded.stamps_s[: len(rows)], rows).any()
+
+
 def test_what_is_left_out_has_its_reason_and_its_first_row() -> None:
     rows_s, quaternions, reported = interpolated("row")
     columns = {
