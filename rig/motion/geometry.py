@@ -252,8 +252,8 @@ def flange_rate_by_joint(
     z: Array | float
     x = y = z = 0.0
     joints = zip(angles_rad, arm.theta_rad, speeds_rad_s, *_twists(arm), strict=True)
-    for angle, offset, speed, across, along in joints:
+    for angle, offset, speed, twist_cos, twist_sin in joints:
         cos, sin = np.cos(angle + offset), np.sin(angle + offset)
         x, y, z = cos * x + sin * y, cos * y - sin * x, z + speed
-        y, z = across * y + along * z, across * z - along * y
+        y, z = twist_cos * y + twist_sin * z, twist_cos * z - twist_sin * y
     return np.stack(np.broadcast_arrays(x, y, z), axis=-1)

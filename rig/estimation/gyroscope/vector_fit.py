@@ -165,8 +165,8 @@ class VectorFit:
 
 def centripetal_m_s2(turns_rad_s: Array, lever_arm_m: Array) -> Array:
     """Return ω × (ω × p) = ω (ω · p) − p ω² (…, 3) of lever arms p (…, 3) from the axis of the rates ω (…, 3)."""
-    along, squares = (np.sum(turns_rad_s * other, axis=-1, keepdims=True) for other in (lever_arm_m, turns_rad_s))
-    inwards: Array = turns_rad_s * along - lever_arm_m * squares
+    projections, squares = (np.sum(turns_rad_s * other, axis=-1, keepdims=True) for other in (lever_arm_m, turns_rad_s))
+    inwards: Array = turns_rad_s * projections - lever_arm_m * squares
     return inwards
 
 
