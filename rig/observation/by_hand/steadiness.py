@@ -14,6 +14,8 @@ from rig.observation.time_stamps.sampling import Sampling
 BLOCK_S = 1.0
 MAX_NOISE_STDS = 6.0  # difference due to noise
 MAX_GAP_S, MAX_GAP_FRACTION = 0.25, 0.01  # at rest: longer gaps are not ignored; readings missing in such gaps
+MAX_SCATTER_RATIO = 10.0  # noise of readings, relative to the quantity's largest change from second to second
+REMEDY = "Give a log of a sensor that lay still all the time; cut off its beginning and its end, where it was moved"
 MAD_TO_STD = 1.4826  # standard deviation over median absolute deviation
 
 
@@ -38,7 +40,17 @@ def fill_missing(readings: Array, numbers: NDArray[np.intp]) -> Array:
 
 
 def check_at_rest(time_s: Array, readings: Array, quantity: Quantity) -> None:
-    """Raise Fault `not_at_rest` if readings (n, 3) at times (n,) differ from second to second by more than noise."""
+    """Raise Fault `not_at_rest` if readings (n, 3) at times (n,) scatter or change by more than noise.
+
+    A sensor that is read slowly while it moves about may look like noise, but no sensor at rest is as noisy.
+    """
+    scatter = MAD_TO_STD * np.median(np.abs(readings - np.median(readings, axis=0)), axis=0)
+    if (largest := float(scatter.max())) > MAX_SCATTER_RATIO * quantity.steady:
+        raise Fault(
+            "not_at_rest",
+            f"the {quantity} scatters by {largest:.2g} {quantity.unit}, more than any sensor's noise",
+            REMEDY,
+        )
     block = np.floor((time_s - time_s[0]) / BLOCK_S).astype(np.intp)
     block = np.unique(block, return_inverse=True)[1]  # none is empty
     count = np.bincount(block)
@@ -52,5 +64,5 @@ def check_at_rest(time_s: Array, readings: Array, quantity: Quantity) -> None:
             "not_at_rest",
             f"about {at_s:.1f} s the {quantity} changes by {worst:.2g} {quantity.unit} within a second or two, "
             "more than by its noise",
-            "Give a log of a sensor that lay still all the time; cut off its beginning and its end, where it was moved",
+            REMEDY,
         )

@@ -16,7 +16,7 @@ from rig.data.processes.reading_parts import Part
 from rig.data.recording.motion_file import MAX_NUMBER
 from rig.errors import Refused
 from rig.estimation.arrays import Array
-from rig.observation.formats.csv_cells import is_number, is_value, repeats, seconds_of, unit_of
+from rig.observation.formats.csv_cells import is_number, is_value, repeats, seconds_of, strip_blank_end, unit_of
 from rig.observation.formats.csv_text import is_harmless, read_rows
 from rig.observation.formats.mat_table import NAN, is_mat, read_mat_columns, spell_numbers
 from rig.observation.formats.table_parts import parts_read_apart
@@ -34,6 +34,11 @@ UNDERSCORED_UNIT = re.compile(r"_(deg_s|dps|mdps|rad_s|m_s2|mg|g|ms|us|ns|s|deg|
 SPELLED_UNITS = {"deg_s": "deg/s", "rad_s": "rad/s", "m_s2": "m/s2", "t": "T", "ut": "uT", "c": "C"}
 ASSUMED_RATE_HZ = 100.0  # the sample rate by which a unit of time is chosen
 EPOCH_RANGE_S = (9e8, 4.2e9)  # seconds since 1970: from 1998 to 2103
+MAX_STEP_S = 2.0  # from reading to reading: numbers with longer steps are no seconds since 1970
+USUAL_FRACTION = 0.98  # of the steps: the others may be gaps, or stamps with a lost digit
+MAX_LATE_FRACTION = 0.05  # of rows that are written a little later than the next one
+COUNT_NAME = re.compile("packet|count|number|index|seq|frame", re.IGNORECASE)
+UNIT_WORDS = {"ms": "ms", "msec": "ms", "us": "us", "µs": "us", "usec": "us", "ns": "ns", "nsec": "ns", "sec": "s"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +121,8 @@ def layout_parts(path: Path, largest_mb: int) -> Iterator[Part]:
         missing |= MISSING_WORDS.intersection(map(str.strip, row))
         if len(sampled) < SAMPLED_ROWS:
             sampled.append(row)
-    width = max([len(heading), *(len(row) for row in sampled[:2])])
+    # A blank cell at the end of each row is none: some loggers end every line by a separator.
+    width = max([len(heading), *(len(strip_blank_end([*map(str.strip, row)])) for row in sampled[:2])])
     # R writes no heading for the column of row numbers.
     shift = width - len(heading) if heading and len(heading) == width - 1 else 0
     headings = [""] * shift + [name.strip() for name in heading]
@@ -253,17 +259,18 @@ def _find_time(
             units[index] in UNITS and UNITS[units[index]].quantity == TIME
         ):
             return index
-    unlike_counts = [index for index in rising if not _increases_by_one(columns[index])]
-    return next(iter(unlike_counts), None)
+    is_count = [bool(COUNT_NAME.search(headings[index])) or _increases_by_one(columns[index]) for index in rising]
+    return next((index for index, counts in zip(rising, is_count, strict=True) if not counts), None)
 
 
 def _rises(column: Sequence[str]) -> bool:
-    """Return whether a column mostly increases, and decreases only at restarts of a counter."""
+    """Return whether a column mostly increases; it may decrease at restarts of a counter, and in a few late rows."""
     try:
         steps = np.diff([float(seconds_of(cell, 1.0)) for cell in column])
     except (ValueError, ArithmeticError):
         return False
-    return len(steps) > 1 and bool((steps < 0).sum() <= 2 and (steps > 0).mean() > 0.1 and np.median(steps) >= 0)
+    falls = (steps < 0).sum() <= max(2, MAX_LATE_FRACTION * len(steps))
+    return len(steps) > 1 and bool(falls and (steps > 0).mean() > 0.1 and np.median(steps) >= 0)
 
 
 def _increases_by_one(column: Sequence[str]) -> bool:
@@ -279,6 +286,9 @@ def _time_unit(heading: str, unit: str, column: Sequence[str]) -> str:
     if unit in ALLOWED_UNITS and UNITS[unit].quantity == TIME:
         return unit
     name = heading.lower()
+    named = [UNIT_WORDS[word] for word in re.split(r"[\W_]+", name) if word in UNIT_WORDS]
+    if named:
+        return named[-1]
     for word, meant in (
         ("milli", "ms"),
         ("micro", "us"),
@@ -291,9 +301,10 @@ def _time_unit(heading: str, unit: str, column: Sequence[str]) -> str:
             return meant
     values = np.array([float(cell) for cell in column])
     sizes = {name: UNITS[name].size for name in ("s", "ms", "us", "ns")}
-    for name, size in sizes.items():
-        if EPOCH_RANGE_S[0] < values[0] * size < EPOCH_RANGE_S[1]:
-            return name
     steps = np.diff(values)
-    step = float(np.mean(steps[steps >= 0]))
+    rising = steps[steps >= 0]
+    step = float(np.mean(rising[rising <= np.quantile(rising, USUAL_FRACTION)]))
+    for name, size in sizes.items():
+        if EPOCH_RANGE_S[0] < values[0] * size < EPOCH_RANGE_S[1] and step * size < MAX_STEP_S:
+            return name
     return min(sizes, key=lambda name: abs(np.log(max(step, 1e-12) * sizes[name] * ASSUMED_RATE_HZ)))

@@ -28,6 +28,7 @@ MIN_COUNT = 500.0  # larger whole numbers are steps of a converter
 BLOCK_S, QUIETEST_FRACTION, QUIET_RATIO = 0.25, 0.1, 3.0
 MAX_RATE_RAD_S, MAX_SCATTER_RAD_S = 40.0, 0.02  # of a gyroscope; the scatter is that at rest
 NORM_TOLERANCE = 2e-3
+MAX_WRAP_STEPS = 20.0  # from the last stamp before a restart to the restart
 MIN_STEPS, MIN_RISING = 10, 0.9  # of a counter; fraction of steps that rise; none may fall
 AXES = ("x", "y", "z")
 REFERENCE = {name for group in MOTIONS["attitudes"].optional for name in group} | {"start_s", "end_s"}
@@ -379,9 +380,16 @@ def _time_entry(layout: TableLayout, time: Array | None) -> dict[str, Any]:
 
 
 def _find_wrap(time: Array) -> int | None:
-    """Return the power of two, in steps, at which a time counter restarts; None if it does not."""
+    """Return the power of two, in steps, at which a time counter restarts; None if it does not.
+
+    A counter restarts close below a power of two. A stamp that lost a digit falls as far, but from anywhere.
+    """
     time = time[np.isfinite(time)]
-    has_fall = len(time) > 1 and bool((np.diff(time) < -0.5 * np.ptp(time)).any())
-    if not has_fall or time.max() < 100 or time.min() < 0:
+    steps = np.diff(time)
+    falls = steps < -0.5 * np.ptp(time)
+    if not falls.any() or time.max() < 100 or time.min() < 0:
         return None
-    return int(2 ** np.ceil(np.log2(time.max() + 1)))
+    wrap = 2 ** np.ceil(np.log2(time.max() + 1))
+    usual = float(np.median(steps[steps >= 0])) if (steps >= 0).any() else 0.0
+    is_near = wrap - time[:-1][falls].min() <= MAX_WRAP_STEPS * max(usual, 1.0)
+    return int(wrap) if is_near else None
