@@ -82,7 +82,8 @@ def read_table(
     """
     rate_hz = None if mapped is None else mapped.rate_hz
     if rate_hz is not None:
-        header = replace(header, needed=tuple(name for name in header.needed if name != TIME))
+        needed = tuple(name for name in header.needed if name != TIME)
+        header = replace(header, needed=needed, one_of=() if TIME in header.one_of else header.one_of)
     if not is_mat(path) and is_harmless(path, largest_mb):
         parts = [*_parts(path, header, largest_mb, mapped, origin_s)]
     else:

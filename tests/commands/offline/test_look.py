@@ -126,6 +126,49 @@ def test_counts_whose_size_is_that_of_the_field_are_no_magnetometer_unless_a_nam
         assert guess is not None and ("x_t" in guess.samples) == is_field
 
 
+LAYOUT = [*(0.1 * RATES_DEG_S.T), *np.tile([[0.1], [0.2], [9.8]], (1, len(TIME_S)))]
+CLOCKS = {  # heading, numbers, unit
+    "a unit in words": ("Time since start in ms", 1e3 * TIME_S, "ms"),
+    "a counter of milliseconds as large as seconds since 1970": ("t", 1_754_197_727 + np.rint(1e3 * TIME_S), "ms"),
+    "microseconds, of which one lost a digit": ("t", np.where(TIME_S[200] == TIME_S, 98e6, 987e6 + 1e6 * TIME_S), "us"),
+    "nanoseconds since 1970 of another kind": ("stamp", 951_412_773_297_707 + 1e9 * TIME_S, "ns"),
+    "rows that come a little late": ("time[s]", TIME_S + 0.03 * (np.arange(len(TIME_S)) % 40 == 7), "s"),
+}
+
+
+@pytest.mark.parametrize("name", CLOCKS)
+def test_the_unit_of_a_clock_is_found(name: str, tmp_path: Path) -> None:
+    heading, times, unit = CLOCKS[name]
+    path = write(tmp_path / "log.csv", f"{heading},gx,gy,gz,ax,ay,az", [times, *LAYOUT])
+    guess = look_at(path).guess
+    assert guess is not None and guess.samples["time_s"] == {"column": heading, "unit": unit}
+
+
+def test_the_number_of_a_packet_is_no_time(tmp_path: Path) -> None:
+    numbers = 8 * np.arange(len(TIME_S)) + np.arange(len(TIME_S)) % 2
+    path = write(tmp_path / "log.csv", "Packet number,gx,gy,gz,ax,ay,az", [numbers, *LAYOUT])
+    guess = look_at(path).guess
+    assert guess is not None and "time_s" not in guess.samples and "gyro" not in guess.others
+    assert any("no column of time" in gap for gap in guess.gaps)
+
+
+def test_a_blank_cell_at_the_end_of_each_row_is_no_column(tmp_path: Path) -> None:
+    path = write(tmp_path / "log.csv", "t,gx,gy,gz,ax,ay,az", [TIME_S, *LAYOUT])
+    ended = [f"{line}," if index else line for index, line in enumerate(path.read_text("utf-8").splitlines())]
+    path.write_text("\n".join(ended) + "\n", encoding="utf-8")
+    guess = look_at(path).guess
+    assert guess is not None and guess.samples["x_rad_s"]["column"] == "gx"
+
+
+def test_a_sensor_that_a_slow_logger_reads_while_it_turns_was_not_at_rest(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    path = write(
+        tmp_path / "log.csv", "time_s,x_rad_s,y_rad_s,z_rad_s", [np.arange(400) / 10, *rng.normal(0, 0.4, (3, 400))]
+    )
+    assert "at rest       no: the rate scatters by 0.4" in rig_here("look", path).stdout
+    assert "not_at_rest" in rig_here("allan", path).stderr
+
+
 def test_decimal_commas_between_commas_are_suspected(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text(
         "t,gx,gy,gz\n" + "0,02,0,48,-0,29,0,23\n0,04,0,51,-0,27,0,18\n" * 20, encoding="utf-8"

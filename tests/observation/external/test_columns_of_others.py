@@ -143,6 +143,15 @@ def test_one_time_of_a_pose_is_a_moment_around_it(tmp_path: Path) -> None:
     assert rows["qw"] == pytest.approx(np.cos(TIME_S / 4)) and rows["qx"] == pytest.approx(np.sin(TIME_S / 4))
 
 
+def test_poses_without_times_have_those_of_their_rate(tmp_path: Path) -> None:
+    columns = {"motion": {name: column for name, column in POSES.items() if name != "time_s"}, "motion_rate_hz": 50}
+    path = poses(tmp_path)
+    lines = [line.partition(",")[2] for line in path.read_text(encoding="utf-8").splitlines()]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    rows = read_attitudes(path, map_motion(ColumnMap.model_validate(columns)))
+    assert (rows["start_s"] + rows["end_s"]) / 2 == pytest.approx(np.arange(len(TIME_S)) / 50, abs=1e-9)
+
+
 def test_quaternions_of_the_other_direction_are_inverted(tmp_path: Path) -> None:
     rows = read_attitudes(poses(tmp_path, -1), map_motion(ColumnMap.model_validate({"motion": POSES})), inverse=True)
     assert rows["qx"] == pytest.approx(np.sin(TIME_S / 4))
