@@ -31,7 +31,8 @@ class SessionProgress:
     - `expanded_scale` (3,): U (k = 2) of the scale factors, from the session and its clock.
     - `faces`, `rests`: face and summary of each rest; `moves`: the summary of each move.
     - `solution`: the solution if the session ended here, None if it is too uncertain.
-    - `fault_of_last`: the fault of the last move or the rest after it. `missing_faces`: faces without a rest.
+    - `fault_of_last`: the fault of the last move or the rest after it; `is_contradiction`: whether it is that the move
+      contradicts those before it, of which one may be wrong too. `missing_faces`: faces without a rest.
     """
 
     expanded_scale: Array
@@ -41,6 +42,7 @@ class SessionProgress:
     solution: HandSolution | None
     fault_of_last: Fault | None
     missing_faces: tuple[str, ...]
+    is_contradiction: bool = False
 
 
 def assess_progress(session: HandRecording, conditions: SessionConditions) -> SessionProgress:
@@ -57,9 +59,12 @@ def assess_progress(session: HandRecording, conditions: SessionConditions) -> Se
     try:
         fitted = fit_session(session, conditions, trusted=last if last >= MIN_COMPARABLE_MOVES else None)
     except Fault as fault:
-        return SessionProgress(unknown, (), (), (), None, fault_of_last or fault, FACES)
+        is_contradiction = fault_of_last is None and fault.name == "no_fit"
+        return SessionProgress(unknown, (), (), (), None, fault_of_last or fault, FACES, is_contradiction)
+    is_contradiction = False
     if fault_of_last is None and last >= MIN_COMPARABLE_MOVES:
         fault_of_last = find_contradiction(fitted, since=last)
+        is_contradiction = fault_of_last is not None
     axes, chosen = SensorAxes.from_matrix(fitted.state.matrix), parameter_columns(fitted)
     covariance = fitted.covariance[np.ix_(chosen, chosen)]
     to_parameters = parameter_jacobian(fitted.state.matrix, axes.scale)
@@ -75,6 +80,7 @@ def assess_progress(session: HandRecording, conditions: SessionConditions) -> Se
         solution if expanded.max() < UNKNOWN_SCALE_U / 4 else None,
         fault_of_last,
         tuple(face for face in FACES if face not in faces),
+        is_contradiction,
     )
 
 

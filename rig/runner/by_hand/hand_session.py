@@ -48,9 +48,11 @@ POLL_S = 0.05
 MAX_HELD_S = 3.0  # time in the hand, after which the operator is reminded to lay it down
 MAX_CLOSURE_STDS = 3.0  # error of a whole turn's end
 MAX_REFUSALS = 10  # in a row; then the session ends, because another error is likely
+# Moves in a row that contradict those before them; then one of those is likely to be wrong. Sessions begun again so.
+MAX_CONTRADICTIONS, MAX_DOUBTED_SESSIONS = 3, 2
 UNFIT_RESTS = frozenset({"held_not_laid_down", "not_flat"})  # the item lies still, but not on a side
 RESTARTS = frozenset(
-    {"bias_jumped", "table_moved", "accelerometer_jumped"}
+    {"bias_jumped", "table_moved", "accelerometer_jumped", "earlier_move_wrong"}
 )  # the readings before and after it contradict each other
 REPEATABLE = frozenset({"clipping", "lost_in_move", "no_fit", "turn_not_closed"}) | UNFIT_RESTS | RESTARTS
 
@@ -83,6 +85,8 @@ class HandSession:
     _accepted: list[HandMove] = field(default_factory=list)
     _lay: list[Face] = field(default_factory=list)  # the faces that have been up
     _refused: int = 0  # number of refused moves in a row
+    _contradicting: int = 0  # number of moves in a row that contradict those before them
+    _doubted_sessions: int = 0  # number of times that the accepted moves were given up for that
     _bias_doubted: bool = False  # whether the item may have crept at the previous rest
     _reminded: bool = False
     _request: HandAsked | None = None
@@ -149,7 +153,7 @@ class HandSession:
         self._pauses_before(rest)
         session = self._not_counted.filter_session(self._segmenter.handled)
         now = self._progress = assess_progress(session, self.conditions)
-        wrong = now.fault_of_last or self._not_closed(now)
+        wrong = self._doubt_earlier_moves(now) or now.fault_of_last or self._not_closed(now)
         read = now.faces[-1] if now.faces else None
         if read is None:
             wrong = wrong or Fault(
@@ -167,6 +171,21 @@ class HandSession:
             self._take(move, now, face)
         self._lay.append(face)
         self._ask(self._next(now, face), wrong)
+
+    def _doubt_earlier_moves(self, now: SessionProgress) -> Fault | None:
+        """Return the Fault of the accepted moves if the last ones all contradict them, or None.
+
+        A wrong move among the first ones is not detected, because nothing contradicts it yet.
+        """
+        self._contradicting = self._contradicting + 1 if now.is_contradiction else 0
+        if self._contradicting < MAX_CONTRADICTIONS or self._doubted_sessions >= MAX_DOUBTED_SESSIONS:
+            return None
+        self._contradicting, self._doubted_sessions = 0, self._doubted_sessions + 1
+        return Fault(
+            "earlier_move_wrong",
+            f"the last {MAX_CONTRADICTIONS} moves contradict those before them, so one of those was wrong",
+            "Go on as the rig asks: the moves are counted from here",
+        )
 
     def _pauses_before(self, rest: HandRest) -> None:
         """Discard rests that are too short to be judged, because they are pauses within a move."""

@@ -13,6 +13,8 @@ from support.laboratories.hand_session_laboratory import LIST, TRUE_SCALE, Table
 pytestmark = pytest.mark.slow
 
 SHORT = replace(LIST, flips=8, turns=2)
+MIXED = {"short": 0.06, "crumb": 0.1, "held": 0.04, "wrong_face": 0.1, "two_turns": 0.03, "other_way": 0.03,
+         "dropped": 0.03, "table_pushed": 0.02}  # fmt: skip
 
 
 def held(table: Table) -> None:
@@ -111,6 +113,14 @@ def test_a_rest_in_which_it_creeps_costs_this_rest_and_not_the_session(creeps: i
     assert table.again == ["bias_jumped"]
     assert not [event for event in table.events if isinstance(event, HandBegunAnew)]
     assert [move.kind for move in table.accepted].count("turn") == 2
+    held(table)
+
+
+def test_after_a_wrong_move_that_nothing_contradicts_yet_the_session_begins_anew() -> None:
+    """Right moves contradict an early wrong one, and were all refused until the run ended."""
+    table = Table(seed=418, mistakes=MIXED, settings=SHORT)
+    table.sit()
+    assert table.again == ["no_fit", "no_fit", "earlier_move_wrong"]
     held(table)
 
 
