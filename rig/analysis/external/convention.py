@@ -20,7 +20,7 @@ from rig.observation.external.csv_samples import Samples
 
 COARSE_LAGS_S, FINE_LAGS_S = np.arange(-0.5, 0.501, 0.02), np.arange(-0.02, 0.0201, 0.002)
 MIN_PAIRS, MAX_PAIRS = 30, 3000  # of rows
-MAX_PAIR_S = 1.0  # between the two rows of a pair
+MIN_STEP_S, MAX_PAIR_S = 0.1, 1.0  # between rows, and between the two rows of a pair
 MIN_RMS_RATE_RAD_S = 0.05  # a smaller one shows nothing
 MIN_EXPLAINED, MAX_UNEXPLAINED_RATIO = 0.7, 0.7  # of the rates' variance; unexplained part, relative to the other fit's
 MIN_GRAVITY, MIN_LEAD = 0.7, 0.1  # relative length of the mean specific force; lead over the other direction
@@ -58,7 +58,8 @@ def find_convention(samples: Samples, attitudes: Columns, *, is_order_named: boo
     middles_s = (attitudes["start_s"] + attitudes["end_s"]) / 2
     order = np.argsort(middles_s)
     inside = order[(middles_s[order] > samples.time_s[0] + 0.5) & (middles_s[order] < samples.time_s[-1] - 0.5)]
-    inside = inside[: MAX_PAIRS + 1]
+    # Rates between rows that follow each other fast are mostly noise of the attitudes.
+    inside = inside[np.unique(np.floor(middles_s[inside] / MIN_STEP_S), return_index=True)[1]][: MAX_PAIRS + 1]
     if len(inside) <= MIN_PAIRS:
         return None
     quaternions = np.column_stack([attitudes[name][inside] for name in QUATERNION])

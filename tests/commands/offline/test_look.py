@@ -245,6 +245,20 @@ def test_the_convention_of_quaternions_is_found(inverse: bool, scalar_last: bool
     assert convention.lag_s == pytest.approx(0.084, abs=0.005)
 
 
+@pytest.mark.parametrize("inverse", [False, True])
+def test_the_direction_of_many_noisy_poses_is_found(inverse: bool, tmp_path: Path) -> None:
+    log = make_log()
+    write_log(log, tmp_path)
+    noise = Rotation.from_rotvec(np.random.default_rng(3).normal(0, 0.01, (len(log.time_s), 3)))
+    true = log.attitudes * noise  # rates from row to row are mostly noise
+    poses = (true.inv() if inverse else true).as_quat(scalar_first=True)
+    samples = look_at(tmp_path / "robot_log.txt").samples
+    attitudes = look_at(write(tmp_path / "poses.csv", "time,qw,qx,qy,qz", [log.time_s, *poses.T])).attitudes
+    assert samples is not None and attitudes is not None
+    convention = find_convention(samples, attitudes, is_order_named=True)
+    assert convention is not None and convention.inverse == inverse
+
+
 def test_row_numbers_and_positions_of_a_pose_file_are_no_gyroscope(tmp_path: Path) -> None:
     log = make_log()
     write_log(log, tmp_path)
