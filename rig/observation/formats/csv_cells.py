@@ -17,6 +17,7 @@ TIME_OF_DAY = re.compile(
 )
 MAX_FLOAT_TIME_S = 1e6  # a clock with a larger time started long before the recording: a float may lose microseconds
 SPELLINGS = (("^", ""), ("sec", "s"), ("²", "2"))  # spellings of units, in addition to those of the table
+COMMENT_MARKS = ("%", "#", "//")
 
 
 def is_number(cell: str) -> bool:
@@ -85,6 +86,11 @@ def strip_blank_end(headings: Sequence[str]) -> list[str]:
     """Return headings without blank ones at the end, because some loggers end every line by a separator."""
     count = max((index for index, name in enumerate(headings, start=1) if name), default=0)
     return [*headings[:count]]
+
+
+def is_comment(row: Sequence[str]) -> bool:
+    """Return whether a row is a comment, which some programs write below their readings."""
+    return row[0].lstrip().startswith(COMMENT_MARKS)
 
 
 def repeats(row: Sequence[str], headings: Sequence[str]) -> bool:

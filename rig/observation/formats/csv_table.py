@@ -18,6 +18,7 @@ from rig.estimation.arrays import Array
 from rig.observation.formats.column_selection import MappedColumns, check_headings, select_columns, unwrap_times
 from rig.observation.formats.csv_cells import (
     find_wrong_unit,
+    is_comment,
     is_number,
     is_time_of_day,
     is_value,
@@ -154,7 +155,7 @@ def _parts(
         for line, row in enumerate(rows, start=first_line):
             numbers = () if origin_s != 0 else wanted.plain_numbers(row)
             if not numbers:
-                if not any(map(str.strip, row)):
+                if not any(map(str.strip, row)) or (has_rows and is_comment(row) and not repeats(row, headings)):
                     continue
                 is_repeated = any(headings) and repeats(row, headings)
                 if is_repeated or ((repeated or not has_rows) and wanted.names_units(line, row)):

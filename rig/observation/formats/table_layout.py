@@ -16,7 +16,15 @@ from rig.data.processes.reading_parts import Part
 from rig.data.recording.motion_file import MAX_NUMBER
 from rig.errors import Refused
 from rig.estimation.arrays import Array
-from rig.observation.formats.csv_cells import is_number, is_value, repeats, seconds_of, strip_blank_end, unit_of
+from rig.observation.formats.csv_cells import (
+    is_comment,
+    is_number,
+    is_value,
+    repeats,
+    seconds_of,
+    strip_blank_end,
+    unit_of,
+)
 from rig.observation.formats.csv_text import is_harmless, read_rows
 from rig.observation.formats.mat_table import NAN, is_mat, read_mat_columns, spell_numbers
 from rig.observation.formats.table_parts import parts_read_apart
@@ -113,6 +121,8 @@ def layout_parts(path: Path, largest_mb: int) -> Iterator[Part]:
     units, missing, count = [""] * len(heading), set[str](), 0
     for row in data:
         if not any(map(str.strip, row)) or (heading and repeats(row, [name.strip() for name in heading])):
+            continue
+        if count and is_comment(row):
             continue
         if not count and not any(map(is_value, row)) and any(map(unit_of, row)):
             units = [cell.strip() for cell in row]

@@ -143,6 +143,14 @@ def test_one_time_of_a_pose_is_a_moment_around_it(tmp_path: Path) -> None:
     assert rows["qw"] == pytest.approx(np.cos(TIME_S / 4)) and rows["qx"] == pytest.approx(np.sin(TIME_S / 4))
 
 
+def test_comments_below_the_readings_are_no_rows(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    rows = [f"{t:.2f},0.1,0.2,0.3" for t in TIME_S]
+    ends = ["% Maximums : 0.1 0.2 0.3", "# done, 40 rows", "// end"]
+    path.write_text("\n".join(["time_s,x_rad_s,y_rad_s,z_rad_s", *rows, *ends]) + "\n", encoding="utf-8")
+    assert len(read_sample_table(path, [RATE], None).columns["x_rad_s"]) == len(TIME_S)
+
+
 def test_poses_without_times_have_those_of_their_rate(tmp_path: Path) -> None:
     columns = {"motion": {name: column for name, column in POSES.items() if name != "time_s"}, "motion_rate_hz": 50}
     path = poses(tmp_path)
