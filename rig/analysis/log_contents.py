@@ -27,7 +27,8 @@ from rig.observation.formats.mat_table import is_mat
 from rig.observation.formats.sample_files import is_in_format
 from rig.observation.formats.table_layout import TableLayout, find_layout
 from rig.observation.log_survey import LogSurvey, survey_log
-from rig.sensors.lines.log_columns import UNSTATED, LogColumns, guess_columns
+from rig.sensors.lines.column_units import UNSTATED
+from rig.sensors.lines.log_columns import LogColumns, guess_columns
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,8 @@ from rig.errors import RigError
 from rig.errors.quoting import shorten
 from rig.observation.formats.table_layout import TableLayout
 from rig.observation.log_survey import LogSurvey
-from rig.sensors.lines.log_columns import UNSTATED, LogColumns
+from rig.sensors.lines.column_units import UNSTATED
+from rig.sensors.lines.log_columns import LogColumns
 
 WIDTH = 14
 COLUMNS = (

@@ -12,35 +12,23 @@ from rig.config.units import UNITS
 from rig.data.quantity import MAX_TEMPERATURE_C
 from rig.data.recording.motion_file import MOTIONS, QUATERNION
 from rig.estimation.arrays import Array
-from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from rig.observation.formats.table_layout import TableLayout
+from rig.sensors.lines.column_attitudes import describe_unread_attitudes, find_matrices, find_quaternion, list_angles
+from rig.sensors.lines.column_names import AXES, order_axes, simplify_heading
+from rig.sensors.lines.column_units import BY_SIZE, MAX_SCALE_ERROR, SI_UNITS, UNSTATED, choose_unit, compare_stated
 from rig.sensors.lines.guessing import Guess, guess_triads
 
 NAMES = {"g": "_rad_s", "a": "_m_s2", "m": "_t"}
 SENSORS = {"g": "gyroscope", "a": "accelerometer", "m": "magnetometer"}
-SI_UNITS = {"g": "rad/s", "a": "m/s2", "m": "T"}
-UNSTATED = "?"  # where a number is still to be stated
 ASSUMED_RATE_HZ = 100.0  # of a log without times
-MAX_SCALE_ERROR = 0.3  # of a gyroscope whose readings confirm a unit
-BY_SIZE = "by size alone"
-MIN_COUNT = 500.0  # larger whole numbers are steps of a converter
 # A block is at rest if its scatter is at most this many times that of the quietest tenth.
 BLOCK_S, QUIETEST_FRACTION, QUIET_RATIO = 0.25, 0.1, 3.0
-MAX_RATE_RAD_S, MAX_SCATTER_RAD_S = 40.0, 0.02  # of a gyroscope; the scatter is that at rest
-NORM_TOLERANCE = 2e-3
 MAX_WRAP_STEPS = 20.0  # from the last stamp before a restart to the restart
 MIN_STEPS, MIN_RISING = 10, 0.9  # of a counter; fraction of steps that rise; none may fall
-AXES = ("x", "y", "z")
 REFERENCE = {name for group in MOTIONS["attitudes"].optional for name in group} | {"start_s", "end_s"}
-QUATERNION_NAME = re.compile(r"(?:.*_)?(?:q|quat|quaternion|orientation|rot|rotation|attitude)_?([wxyz0-3])")
 TIME_NAME = re.compile(r"time|stamp", re.IGNORECASE)
 POSITION_NAME = re.compile(r"(?:(?:p|t|pos|position|trans|translation)_?)?[xyz](?: \[.*\])?")
-KIND_OF = {UNITS["rad/s"].quantity: ("gyro",), UNITS["m/s2"].quantity: ("acc",), UNITS["T"].quantity: ("mag",)}
 FIELD_NAME = re.compile(r".*(mag|field|compass)|[bhm]_?[xyz]\b", re.IGNORECASE)
-QUATERNION_DIGITS = {"0": "qw", "1": "qx", "2": "qy", "3": "qz"}
-GRAVITY_BY_UNIT = {"m/s2": STANDARD_GRAVITY_M_S2, "g": 1.0, "mg": 1000.0}
-ANGLE_WORDS = {"yaw", "pitch", "roll", "heading", "azimuth", "phi", "theta", "psi", "euler"}
-ROUND_STEPS = (131.0, 65.5, 32.8, 16.4)  # steps per °/s, as data sheets state them
 
 ColumnEntry = Mapping[str, Any]  # a column's entry: its name or number, and its unit
 
@@ -90,15 +78,17 @@ def guess_columns(layout: TableLayout, values: Array, time: Array | None) -> Log
     `time` (n,) is in the layout's unit, None without times. Values may be NaN in rows that belong to other sensors.
     """
     unit_s = 1.0 if layout.time_unit is None else UNITS[layout.time_unit].size
+    matrices = find_matrices(layout, values if time is None else _insert_time(layout, values, time))
+    if layout.time in matrices:  # an element that rises is no time
+        layout, time = replace(layout, time=None, time_unit=None), None
     rate_hz = ASSUMED_RATE_HZ if time is None else _mean_rate_hz(unit_s * time)
-    quaternion = _find_quaternion(layout, values)
-    samples, gaps = _guess_samples(layout, values, quaternion, rate_hz)
+    quaternion = find_quaternion(layout, values, matrices)
+    samples, gaps = _guess_samples(layout, values, {*quaternion.values(), *matrices}, rate_hz)
     if layout.time is None:
         gaps.append("no column of time: state samples_rate_hz")
-    if not quaternion and (angles := _list_angles(layout)):
-        names = " ".join(layout.headings[index] for index in angles)
-        gaps.append(f"the order of the turns in {names}: attitudes are read as quaternions, qw qx qy qz; convert them")
-    elif not samples and not quaternion:
+    unread = [] if quaternion else describe_unread_attitudes(layout, matrices, list_angles(layout))
+    gaps += unread
+    if not samples and not quaternion and not unread:
         gaps.append(
             "which columns are readings: none look like a sensor's. State them with --columns. If numbers have a "
             "decimal comma, divide the columns by semicolons"
@@ -109,8 +99,13 @@ def guess_columns(layout: TableLayout, values: Array, time: Array | None) -> Log
     return LogColumns({**timed, **samples} if samples else {}, {**timed, **motion} if motion else {}, gaps, others)
 
 
+def _insert_time(layout: TableLayout, values: Array, time: Array) -> Array:
+    """Return the values with the column of time, which is NaN among them."""
+    return np.where(np.arange(values.shape[1]) == layout.time, time[:, None], values)
+
+
 def _guess_samples(
-    layout: TableLayout, values: Array, quaternion: Mapping[str, int], rate_hz: float
+    layout: TableLayout, values: Array, attitudes: set[int], rate_hz: float
 ) -> tuple[dict[str, ColumnEntry], list[str]]:
     """Return the column map of the readings, and sentences on doubtful columns.
 
@@ -118,7 +113,7 @@ def _guess_samples(
     """
     samples: dict[str, ColumnEntry] = {}
     gaps: list[str] = []
-    for group in _group_columns(layout, values, quaternion, rate_hz):
+    for group in _group_columns(layout, values, attitudes, rate_hz):
         guessed = guess_triads(group.names, group.values, group.still, rate_hz)
         if not samples and _is_undetermined(group.names, guessed):
             columns = [layout.name(index) for index in group.indices]
@@ -173,9 +168,9 @@ def _map_triad(
     indices = [group.indices[position] for position in positions]
     values, stated = group.values[:, positions], layout.units[indices[0]]
     if stated in UNITS and UNITS[stated].quantity == UNITS[SI_UNITS[kind]].quantity:
-        unit, reason = _compare_stated(kind, stated, values, group.still)
+        unit, reason = compare_stated(kind, stated, values, group.still)
     else:
-        unit, reason = _unit_of(kind, dict(guessed.units[kind]), values, group.still)
+        unit, reason = choose_unit(kind, dict(guessed.units[kind]), values, group.still)
     columns = zip(AXES, indices, strict=True)
     return {axis + NAMES[kind]: {"column": layout.name(index), **unit} for axis, index in columns}, reason
 
@@ -213,86 +208,29 @@ def _mean_rate_hz(time_s: Array) -> float:
     return 1 / float(np.mean(steps[steps <= np.quantile(steps, 0.99)])) if len(steps) else ASSUMED_RATE_HZ
 
 
-def _plain_name(layout: TableLayout, index: int) -> str:
-    """Return a heading in the form of a device's column names: `gyro_x [deg/s]`."""
-    name = layout.headings[index].rpartition(".")[2] if "(:" in layout.headings[index] else layout.headings[index]
-    if (match := re.fullmatch(r"(.*)\((?::,)?([1-3])(?:,:)?\)", name)) is not None:
-        name = f"{match[1]}_{'xyz'[int(match[2]) - 1]}"
-    name = re.sub(r"\s*[\[(].*?[\])]", "", name).strip()
-    words = [word for word in re.split(r"[\W_]+", re.sub(r"([a-z])([XYZ])\b", r"\1_\2", name).lower()) if word]
-    words = _strip_units(words)
-    if words and words[-1] not in AXES and words[0] in AXES:
-        words = [*words[1:], words[0]]
-    if len(words) > 2 and words[-1] in AXES:  # imu_angular_velocity_x, w_RS_S_x
-        kind = next((word for word in words[:-1] if word[:3] in KINDS or word in KINDS), None)
-        words = [KINDS.get(kind, KINDS.get(kind[:3], "")), words[-1]] if kind is not None else words
-    unit = layout.units[index]
-    if len(words) == 1 and words[0] in AXES and unit in UNITS:  # x [°/s]
-        words = [*KIND_OF.get(UNITS[unit].quantity, ()), *words]
-    return "_".join(words) + (f" [{unit}]" if unit else "")
-
-
-KINDS = {
-    "gyr": "gyro",
-    "ang": "gyro",
-    "omega": "gyro",
-    "w": "gyro",
-    "rot": "gyro",
-    "acc": "acc",
-    "lin": "acc",
-    "a": "acc",
-    "mag": "mag",
-}
-
-
-def _strip_units(words: list[str]) -> list[str]:
-    """Return a heading's words up to the axis, without a unit that follows, as in x_rad_s."""
-    axes = [position for position, word in enumerate(words) if word in AXES]
-    if axes and axes[-1] < len(words) - 1 and all(word in UNIT_WORDS for word in words[axes[-1] + 1 :]):
-        kind = {"rad": "gyro", "deg": "gyro", "dps": "gyro", "m": "acc", "t": "mag", "ut": "mag"}.get(
-            words[axes[-1] + 1]
-        )
-        before = words[: axes[-1]] or ([kind] if kind else [])
-        return [*before, words[axes[-1]]]
-    return words
-
-
-UNIT_WORDS = {"rad", "s", "deg", "dps", "mdps", "m", "s2", "g", "mg", "t", "ut"}
-
-
-def _group_columns(
-    layout: TableLayout, values: Array, quaternion: Mapping[str, int], rate_hz: float
-) -> Iterator[_ColumnGroup]:
+def _group_columns(layout: TableLayout, values: Array, attitudes: set[int], rate_hz: float) -> Iterator[_ColumnGroup]:
     """Yield the columns that may be readings, in groups whose columns have numbers in the same rows.
 
     There is one group for each rate of the logger. Columns of a reference are left out, including its positions if the
-    log has a quaternion, because positions look like readings. Constant columns are left out too, and so are counters,
+    log has attitudes, because positions look like readings. Constant columns are left out too, and so are counters,
     such as the numbers of the rows and a second clock, and durations.
     """
-    names = _name_once([_plain_name(layout, index) for index in range(len(layout.headings))])
-    used = {layout.time, *quaternion.values(), *(i for i, name in enumerate(layout.headings) if name in REFERENCE)}
-    used |= {*_list_angles(layout), *(i for i, name in enumerate(layout.headings) if TIME_NAME.search(name))}
-    if quaternion:
-        used |= {index for index, name in enumerate(names) if not name or POSITION_NAME.fullmatch(name)}
+    names = _name_once([simplify_heading(layout, index) for index in range(len(layout.headings))])
+    used = {layout.time, *attitudes, *(i for i, name in enumerate(layout.headings) if name in REFERENCE)}
+    used |= {*list_angles(layout), *(i for i, name in enumerate(layout.headings) if TIME_NAME.search(name))}
+    if attitudes:
+        used |= {index for index, name in enumerate(names) if POSITION_NAME.fullmatch(name)}
+    if len(attitudes) == len(QUATERNION):
+        used |= {index for index, name in enumerate(names) if not name}
     groups: dict[bytes, list[int]] = {}
     for index in layout.numbers:
         if index not in used and not _is_constant(values[:, index]) and not _is_counter(values[:, index]):
             groups.setdefault(np.isfinite(values[:, index]).tobytes(), []).append(index)
     for group in groups.values():
-        indices = _order_axes(group, names)
+        indices = order_axes(group, names)
         part = values[np.isfinite(values[:, indices[0]])][:, indices]
         still = find_still(part, rate_hz * len(part) / max(len(values), 1))
         yield _ColumnGroup(indices, tuple(names[index] for index in indices), part, still)
-
-
-def _order_axes(indices: Sequence[int], names: Sequence[str]) -> list[int]:
-    """Return the columns, in the order x, y, z if these are their names, because some loggers write z first."""
-    axes = iter(sorted((index for index in indices if _is_axis(names[index])), key=lambda index: names[index]))
-    return [next(axes) if _is_axis(names[index]) else index for index in indices]
-
-
-def _is_axis(name: str) -> bool:
-    return name.partition(" ")[0] in AXES
 
 
 def _is_constant(column: Array) -> bool:
@@ -303,70 +241,6 @@ def _is_counter(column: Array) -> bool:
     """Return whether a column rises from row to row, as the numbers of the rows or a second clock do."""
     steps = np.diff(column[np.isfinite(column)])
     return len(steps) > MIN_STEPS and bool((steps >= 0).all() and (steps > 0).mean() > MIN_RISING)
-
-
-def _list_angles(layout: TableLayout) -> list[int]:
-    """Return the columns with headings of attitude angles and without a unit of a rate."""
-    return [
-        index
-        for index in layout.numbers
-        if ANGLE_WORDS.intersection(re.split(r"[\W_\d]+", layout.headings[index].lower()))
-        and "rate" not in layout.headings[index].lower()
-        and (layout.units[index] not in UNITS or UNITS[layout.units[index]].quantity != UNITS["rad/s"].quantity)
-    ]
-
-
-def _find_quaternion(layout: TableLayout, values: Array) -> dict[str, int]:
-    """Return the columns of a quaternion, qw qx qy qz: by their names, or four adjacent columns whose norm is 1."""
-    named: dict[str, int] = {}
-    for index in layout.numbers:
-        name = re.sub(r"[\W_]+", "_", layout.headings[index].lower()).strip("_")
-        if (match := QUATERNION_NAME.fullmatch(name)) is not None:
-            named.setdefault(QUATERNION_DIGITS.get(match[1], f"q{match[1]}"), index)
-    if set(named) == set(QUATERNION) and _have_length_1(values[:, [*named.values()]]):
-        return {name: named[name] for name in QUATERNION}
-    for start in layout.numbers:
-        indices = [start + offset for offset in range(4)]
-        if set(indices) <= set(layout.numbers) and layout.time not in indices and _have_length_1(values[:, indices]):
-            return dict(zip(QUATERNION, indices, strict=True))
-    return {}
-
-
-def _have_length_1(values: Array) -> bool:
-    whole = values[np.isfinite(values).all(axis=1)]
-    return len(whole) > 1 and bool(np.median(np.abs(np.linalg.norm(whole, axis=1) - 1)) < NORM_TOLERANCE)
-
-
-def _unit_of(kind: str, unit: dict[str, Any], values: Array, still: NDArray[np.bool_]) -> tuple[dict[str, Any], str]:
-    """Return unit and factor of a triad in the form of a column map, and the reason if unit or factor is uncertain."""
-    if (scale := unit.pop("scale", None)) is not None:
-        steps = 1 / float(scale)
-        near = min(ROUND_STEPS, key=lambda round_steps: abs(steps / round_steps - 1))
-        exact = near if kind == "g" and abs(steps / near - 1) < 1e-3 else round(steps)
-        is_whole = kind == "a" or exact == near
-        return {"unit": unit["unit"], **({"lsb_per_unit": exact} if is_whole else {"factor": scale})}, ""
-    if unit["unit"] != "?":
-        return {"unit": unit["unit"]}, ""
-    if kind != "g":
-        return {"unit": SI_UNITS[kind]}, "the size of its readings fits no unit; check that it is SI"
-    if (values == np.rint(values)).all() and np.abs(values).max() > MIN_COUNT:
-        return {"unit": "deg/s", "lsb_per_unit": UNSTATED}, "steps of a converter: state lsb_per_unit by its data sheet"
-    turned = values - np.median(values[still], axis=0)
-    noise = np.median(np.abs(np.diff(values, axis=0)), axis=0).max()  # a steady turn is as quiet as a rest
-    if np.abs(turned).max() > MAX_RATE_RAD_S or noise > MAX_SCATTER_RAD_S:
-        largest = f"{np.abs(values).max():.4g}"
-        reason = f"deg/s {BY_SIZE} (up to {largest}); if these are counts, give factor or lsb_per_unit"
-        return {"unit": "deg/s"}, reason
-    return {"unit": "rad/s"}, f"rad/s {BY_SIZE} (up to {np.abs(values).max():.3g})"
-
-
-def _compare_stated(kind: str, stated: str, values: Array, still: NDArray[np.bool_]) -> tuple[dict[str, Any], str]:
-    """Return the unit that the heading states, and a sentence if an accelerometer's norm at rest contradicts it."""
-    level = float(np.median(np.linalg.norm(values[still] if still.any() else values, axis=1)))
-    fitting = [unit for unit, size in GRAVITY_BY_UNIT.items() if abs(level / size - 1) < 0.15]
-    if kind == "a" and fitting and stated not in fitting:
-        return {"unit": fitting[0]}, f"the heading says {stated}, but at rest it reads {level:.4g}, as in {fitting[0]}"
-    return {"unit": stated}, ""
 
 
 def _time_entry(layout: TableLayout, time: Array | None) -> dict[str, Any]:

@@ -1,0 +1,37 @@
+"""`rig look` states nothing about a column that neither its heading nor gravity shows, and says why it does not."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from rig.analysis.log_contents import look_at
+from rig.estimation.arrays import Array
+from rig.sensors.lines.log_columns import LogColumns
+
+pytestmark = pytest.mark.slow
+
+TIME_S = np.arange(600) / 100
+NOISE = np.random.default_rng(1).normal(size=(len(TIME_S), 3))
+ANGLES = np.clip(TIME_S - 2, 0, 2)[:, None] * [0.5, -0.4, 0.3]  # at rest, turning, at rest
+FORCES = Rotation.from_rotvec(ANGLES).inv().apply([0.0, 1.0, 9.75]) + 0.01 * NOISE
+RATES = np.gradient(ANGLES, TIME_S, axis=0) + 1e-3 * NOISE[::-1]
+
+
+def guess(path: Path, heading: str, *columns: Array) -> LogColumns:
+    """Return the guess at a file with this heading, if any, and these columns."""
+    rows = [",".join(f"{cell:.12g}" for cell in row) for row in np.column_stack(columns)]
+    path.write_text("\n".join([*([heading] if heading else []), *rows]) + "\n", encoding="utf-8")
+    looked = look_at(path).guess
+    assert looked is not None
+    return looked
+
+
+def test_rows_of_a_rotation_matrix_are_no_quaternion(tmp_path: Path) -> None:
+    matrices = Rotation.from_rotvec(np.add(ANGLES, [0.001, 0.002, 0.01])).as_matrix().reshape(-1, 9)
+    names = ",".join(f"M{row}{column}" for row in "123" for column in "123")
+    for heading in (f"time,roll,pitch,yaw,{names}", ""):
+        guessed = guess(tmp_path / "log.csv", heading, TIME_S, 1e-4 * NOISE, matrices)
+        (gap,) = [gap for gap in guessed.gaps if "rotation matrices" in gap]
+        assert not guessed.motion and "from_matrix(M.reshape(-1, 3, 3)).as_quat(scalar_first=True)" in gap
