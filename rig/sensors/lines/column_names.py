@@ -7,6 +7,8 @@ from rig.config.units import UNITS
 from rig.observation.formats.table_layout import TableLayout
 
 AXES = ("x", "y", "z")
+TEMPERATURE_WORDS = {"temp", "temperature"}
+BRACKETED_CELSIUS = re.compile(r"[\[(]\s*(°|deg ?)?C\s*[\])]")
 KIND_OF = {UNITS["rad/s"].quantity: ("gyro",), UNITS["m/s2"].quantity: ("acc",), UNITS["T"].quantity: ("mag",)}
 
 
@@ -24,6 +26,8 @@ def simplify_heading(layout: TableLayout, index: int) -> str:
         kind = next((word for word in words[:-1] if word[:3] in KINDS or word in KINDS), None)
         words = [KINDS.get(kind, KINDS.get(kind[:3], "")), words[-1]] if kind is not None else words
     unit = layout.units[index]
+    if TEMPERATURE_WORDS.intersection(words) or BRACKETED_CELSIUS.search(layout.headings[index]):
+        return "temp"
     if len(words) == 1 and words[0] in AXES and unit in UNITS:  # x [°/s]
         words = [*KIND_OF.get(UNITS[unit].quantity, ()), *words]
     return "_".join(words) + (f" [{unit}]" if unit else "")

@@ -319,12 +319,13 @@ def _rate_unit(shape: Shape, guess: Guess, rates: Array, still: Flags) -> tuple[
 
 
 def _find_temperature(shape: Shape, guess: Guess, still: Flags) -> None:
-    """Take the first unknown column with a mean of 10 to 60 and small changes as the temperature in °C."""
+    """Take the first column without a name, with a mean of 10 to 60 and small changes, as the temperature in °C."""
     if "temperature" in guess.columns:
         return
     for index, name in enumerate(guess.columns):
         column = shape.values[:, index]
-        if name == "-" and 10 < column.mean() < 60 and 0 < np.ptp(column) < 2:
+        is_named = bool(shape.names) and bool(shape.names[index])
+        if name == "-" and not is_named and 10 < column.mean() < 60 and 0 < np.ptp(column) < 2:
             guess.columns[index] = "temperature"
             guess.reasons.append(f"column {index + 1} is the temperature in °C, by its size: see that it is")
             return

@@ -26,6 +26,7 @@ BLOCK_S, QUIETEST_FRACTION, QUIET_RATIO = 0.25, 0.1, 3.0
 MAX_WRAP_STEPS = 20.0  # from the last stamp before a restart to the restart
 MIN_STEPS, MIN_RISING = 10, 0.9  # of a counter; fraction of steps that rise; none may fall
 REFERENCE = {name for group in MOTIONS["attitudes"].optional for name in group} | {"start_s", "end_s"}
+REPEATED = "repeated"
 TIME_NAME = re.compile(r"time|stamp", re.IGNORECASE)
 POSITION_NAME = re.compile(r"(?:(?:p|t|pos|position|trans|translation)_?)?[xyz](?: \[.*\])?")
 FIELD_NAME = re.compile(r".*(mag|field|compass)|[bhm]_?[xyz]\b", re.IGNORECASE)
@@ -186,8 +187,8 @@ def _list_others(layout: TableLayout, entries: Sequence[ColumnEntry]) -> list[st
 
 
 def _name_once(names: list[str]) -> list[str]:
-    """Return the names with repeated ones blank, so that of two sensors with the same names the first is read."""
-    return [name if name not in names[:index] else "" for index, name in enumerate(names)]
+    """Return the names with repeated ones marked, so that of two sensors with the same names the first is read."""
+    return [f"{REPEATED} {name}" if name and name in names[:index] else name for index, name in enumerate(names)]
 
 
 def find_still(values: Array, rate_hz: float) -> NDArray[np.bool_]:

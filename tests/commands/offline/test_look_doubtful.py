@@ -35,3 +35,13 @@ def test_rows_of_a_rotation_matrix_are_no_quaternion(tmp_path: Path) -> None:
         guessed = guess(tmp_path / "log.csv", heading, TIME_S, 1e-4 * NOISE, matrices)
         (gap,) = [gap for gap in guessed.gaps if "rotation matrices" in gap]
         assert not guessed.motion and "from_matrix(M.reshape(-1, 3, 3)).as_quat(scalar_first=True)" in gap
+
+
+@pytest.mark.parametrize(
+    ("heading", "column"), [("LOCATION Latitude", None), ("heading", None), ("board temp", 5), ("T [°C]", 5), ("", 5)]
+)
+def test_a_temperature_has_a_name_that_says_so_or_none(heading: str, column: int | None, tmp_path: Path) -> None:
+    numbers = 33.9 + 0.1 * np.sin(TIME_S)
+    guessed = guess(tmp_path / "log.csv", f"time,gx,gy,gz,{heading}", TIME_S, RATES, numbers)
+    read = guessed.samples.get("temperature_c")
+    assert read is None if column is None else read == {"column": heading or column, "unit": "C"}
