@@ -1,5 +1,6 @@
 """Units as external files and devices spell them, with their quantity and their size in SI."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import pi, radians
@@ -60,3 +61,21 @@ UNITS: Final[Mapping[str, Unit]] = MappingProxyType(
     | _spelt(PRESSURE, 1e3, "kPa")
     | _spelt(NUMBER, 1.0, "1")
 )
+
+# Words in headings, as `UNITS` spells them.
+_WORDS = {
+    r"^in\s+": "", r"[μµ]|micro ?": "u", r"milli ?": "m", r"nano ?": "n", "²": "2", r"\^": "", r"radians?": "rad",
+    r"degrees?": "deg", r"teslas?": "t", r"gravit(y|ies)|g'?s$": "g", r"\s*(/|per)\s*s(ec(ond)?)?": "/s",
+    r"celsius": "degc",
+}  # fmt: skip
+_SMALL = {name.casefold(): name for name in reversed([*UNITS]) if len(name) > 1} | {"g": "g"}
+
+
+def find_unit(spelling: str) -> str:
+    """Return a unit that is spelled in words or with other capitals, as `UNITS` spells it, or "" if it is unknown."""
+    if spelling.strip() in UNITS:
+        return spelling.strip()
+    text = spelling.strip().casefold()
+    for pattern, word in _WORDS.items():
+        text = re.sub(pattern, word, text)
+    return _SMALL.get(text, "")

@@ -3,13 +3,25 @@
 import re
 from collections.abc import Sequence
 
-from rig.config.units import UNITS
+from rig.config.units import UNITS, find_unit
 from rig.observation.formats.table_layout import TableLayout
 
 AXES = ("x", "y", "z")
 TEMPERATURE_WORDS = {"temp", "temperature"}
 BRACKETED_CELSIUS = re.compile(r"[\[(]\s*(°|deg ?)?C\s*[\])]")
 KIND_OF = {UNITS["rad/s"].quantity: ("gyro",), UNITS["m/s2"].quantity: ("acc",), UNITS["T"].quantity: ("mag",)}
+
+
+def state_unit(layout: TableLayout, index: int) -> str:
+    """Return the unit that a column's heading states, as `UNITS` spells it, or "".
+
+    G after an accelerometer's name is that of gravity, not gauss.
+    """
+    unit, heading = layout.units[index], layout.headings[index]
+    if unit in UNITS:
+        return unit.lower() if unit in ("G", "mG") and "acc" in heading.lower() else unit
+    bracketed = re.search(r"[\[(]([^\])]+)[\])]\s*$", heading)
+    return find_unit(bracketed[1] if bracketed else unit)
 
 
 def simplify_heading(layout: TableLayout, index: int) -> str:
@@ -25,7 +37,7 @@ def simplify_heading(layout: TableLayout, index: int) -> str:
     if len(words) > 2 and words[-1] in AXES:  # imu_angular_velocity_x, w_RS_S_x
         kind = next((word for word in words[:-1] if word[:3] in KINDS or word in KINDS), None)
         words = [KINDS.get(kind, KINDS.get(kind[:3], "")), words[-1]] if kind is not None else words
-    unit = layout.units[index]
+    unit = state_unit(layout, index)
     if TEMPERATURE_WORDS.intersection(words) or BRACKETED_CELSIUS.search(layout.headings[index]):
         return "temp"
     if len(words) == 1 and words[0] in AXES and unit in UNITS:  # x [°/s]

@@ -14,7 +14,7 @@ from rig.data.recording.motion_file import MOTIONS, QUATERNION
 from rig.estimation.arrays import Array
 from rig.observation.formats.table_layout import TableLayout
 from rig.sensors.lines.column_attitudes import describe_unread_attitudes, find_matrices, find_quaternion, list_angles
-from rig.sensors.lines.column_names import AXES, order_axes, simplify_heading
+from rig.sensors.lines.column_names import AXES, order_axes, simplify_heading, state_unit
 from rig.sensors.lines.column_units import BY_SIZE, MAX_SCALE_ERROR, SI_UNITS, UNSTATED, choose_unit, compare_stated
 from rig.sensors.lines.guessing import Guess, guess_triads
 
@@ -167,7 +167,7 @@ def _map_triad(
     """Return the map of a triad's three columns, and the reason if its unit is uncertain."""
     positions = [guessed.columns.index(kind + axis) for axis in AXES]
     indices = [group.indices[position] for position in positions]
-    values, stated = group.values[:, positions], layout.units[indices[0]]
+    values, stated = group.values[:, positions], state_unit(layout, indices[0])
     if stated in UNITS and UNITS[stated].quantity == UNITS[SI_UNITS[kind]].quantity:
         unit, reason = compare_stated(kind, stated, values, group.still)
     else:

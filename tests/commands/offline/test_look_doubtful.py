@@ -45,3 +45,21 @@ def test_a_temperature_has_a_name_that_says_so_or_none(heading: str, column: int
     guessed = guess(tmp_path / "log.csv", f"time,gx,gy,gz,{heading}", TIME_S, RATES, numbers)
     read = guessed.samples.get("temperature_c")
     assert read is None if column is None else read == {"column": heading or column, "unit": "C"}
+
+
+@pytest.mark.parametrize(
+    ("unit", "spelled", "size"),
+    [("rad/s", "in radians/s", 1.0), ("mdeg/s", "mDeg/s", 57295.78), ("m/s²", "m/s²", 0.97), ("g", "in G's", 0.1)],
+)
+def test_units_in_words_are_read_and_m_s2_is_no_other_unit_than_m_s_squared(
+    unit: str, spelled: str, size: float, tmp_path: Path
+) -> None:
+    kind, readings = ("x_m_s2", FORCES) if unit in ("m/s²", "g") else ("x_rad_s", RATES)
+    heading = f"time,x ({spelled}),y ({spelled}),z ({spelled})"
+    guessed = guess(tmp_path / "log.csv", heading, TIME_S, size * readings)
+    assert guessed.samples[kind]["unit"] == unit and not guessed.gaps
+
+
+def test_an_accelerometer_that_reads_0_93_at_rest_is_nearest_to_g(tmp_path: Path) -> None:
+    guessed = guess(tmp_path / "log.csv", "time,ax,ay,az", TIME_S, 0.093 * FORCES)
+    assert guessed.samples["x_m_s2"]["unit"] == "g" and any("nearest to 1 g in g" in gap for gap in guessed.gaps)
