@@ -79,7 +79,7 @@ def look_at(path: Path, stated: ColumnMap | None = None) -> LookedFile:
         remedy = f"Give it with its log: rig solve LOG --sweeps {path}"
         raise Refused("bad_option", f"{path} is not a log: it states sweeps, in the rig's own columns", remedy)
     values, time = _read_numbers(path, layout)
-    guess = guess_columns(layout, values, time)
+    guess = guess_columns(layout, values, time, path.stem)
     columns = _map_of(layout, guess)
     looked = LookedFile(path, layout, guess, columns)
     if is_incomplete(columns):

@@ -66,6 +66,7 @@ def _describe_table(path: Path, layout: TableLayout, guess: LogColumns) -> Itera
             yield _row(name, _spell(*(entries[column] for column in columns)))
     if guess.others:
         yield _row("not read", shorten(" ".join(guess.others)))
+    yield from (_row("", reason) for reason in guess.reasons)
     for gap in guess.gaps:
         yield _row("UNKNOWN", gap)
     if layout.missing:

@@ -9,7 +9,7 @@ from rig.observation.formats.table_layout import TableLayout
 AXES = ("x", "y", "z")
 TEMPERATURE_WORDS = {"temp", "temperature"}
 BRACKETED_CELSIUS = re.compile(r"[\[(]\s*(°|deg ?)?C\s*[\])]")
-KIND_OF = {UNITS["rad/s"].quantity: ("gyro",), UNITS["m/s2"].quantity: ("acc",), UNITS["T"].quantity: ("mag",)}
+KIND_OF = {UNITS["rad/s"].quantity: "gyro", UNITS["m/s2"].quantity: "acc", UNITS["T"].quantity: "mag"}
 
 
 def state_unit(layout: TableLayout, index: int) -> str:
@@ -21,7 +21,8 @@ def state_unit(layout: TableLayout, index: int) -> str:
     if unit in UNITS:
         return unit.lower() if unit in ("G", "mG") and "acc" in heading.lower() else unit
     bracketed = re.search(r"[\[(]([^\])]+)[\])]\s*$", heading)
-    return find_unit(bracketed[1] if bracketed else unit)
+    text = bracketed[1] if bracketed else unit
+    return find_unit(f"{text}/s" if text.casefold() == "mdeg" else text)  # some loggers leave out the second
 
 
 def simplify_heading(layout: TableLayout, index: int) -> str:
@@ -31,21 +32,44 @@ def simplify_heading(layout: TableLayout, index: int) -> str:
         name = f"{match[1]}_{'xyz'[int(match[2]) - 1]}"
     name = re.sub(r"\s*[\[(].*?[\])]", "", name).strip()
     words = [word for word in re.split(r"[\W_]+", re.sub(r"([a-z])([XYZ])\b", r"\1_\2", name).lower()) if word]
-    words = _strip_units(words)
-    if words and words[-1] not in AXES and words[0] in AXES:
-        words = [*words[1:], words[0]]
-    if len(words) > 2 and words[-1] in AXES:  # imu_angular_velocity_x, w_RS_S_x
-        kind = next((word for word in words[:-1] if word[:3] in KINDS or word in KINDS), None)
-        words = [KINDS.get(kind, KINDS.get(kind[:3], "")), words[-1]] if kind is not None else words
     unit = state_unit(layout, index)
     if TEMPERATURE_WORDS.intersection(words) or BRACKETED_CELSIUS.search(layout.headings[index]):
         return "temp"
-    if len(words) == 1 and words[0] in AXES and unit in UNITS:  # x [°/s]
-        words = [*KIND_OF.get(UNITS[unit].quantity, ()), *words]
+    words = _strip_units(_divide_axis(words))
+    if words and words[-1] not in AXES and words[0] in AXES:
+        words = [*words[1:], words[0]]
+    if words and words[-1] in AXES and (kind := _find_kind(words[:-1], unit)):
+        words = [kind, words[-1]]
     return "_".join(words) + (f" [{unit}]" if unit else "")
 
 
+def _find_kind(words: Sequence[str], unit: str) -> str:
+    """Return the sensor that a heading's words before the axis name, or "": by the unit, or else by the words.
+
+    A unit counts more than a word, because fx_uT is a field, no force.
+    """
+    text = "_".join(words)
+    if OTHER_WORDS.search(text):
+        return ""
+    if unit in UNITS and UNITS[unit].quantity in KIND_OF:  # x [°/s]
+        return KIND_OF[UNITS[unit].quantity]
+    kinds = [KINDS.get(word, KINDS.get(word[:3], "")) for word in words] if len(words) > 1 else []
+    kinds += [kind for part, kind in SENSOR_PARTS.items() if part in text]  # SENSgyro
+    return next(filter(None, kinds), "")
+
+
+def _divide_axis(words: list[str]) -> list[str]:
+    """Return a heading's words with the axis apart from a short name of a sensor, as in fx_uT."""
+    match = re.fullmatch(r"(.+)([xyz])", words[0]) if words else None
+    is_short = match is not None and match[1] in SHORT_NAMES and UNIT_WORDS.issuperset(words[1:])
+    return [match[1], match[2], *words[1:]] if match is not None and is_short else words
+
+
+OTHER_WORDS = re.compile(r"angle|angular_?acc|accuracy|magnitude|bias|offset|std|sigma|covar|error|jerk")
+SHORT_NAMES = {"g", "gyr", "gyro", "w", "r", "a", "acc", "accel", "f", "m", "mag", "b", "h"}
+SENSOR_PARTS = {"gyr": "gyro", "acc": "acc", "mag": "mag"}
 KINDS = {
+    "g": "gyro",
     "gyr": "gyro",
     "ang": "gyro",
     "omega": "gyro",
@@ -70,6 +94,7 @@ def _strip_units(words: list[str]) -> list[str]:
     return words
 
 
+LABEL = r"[a-z]?|(c|col|column|v|var|ch|channel|d|data|value|field|unnamed|x)_?\d+"
 UNIT_WORDS = {"rad", "s", "deg", "dps", "mdps", "m", "s2", "g", "mg", "t", "ut"}
 
 
@@ -81,3 +106,8 @@ def order_axes(indices: Sequence[int], names: Sequence[str]) -> list[int]:
 
 def is_axis(name: str) -> bool:
     return name.partition(" ")[0] in AXES
+
+
+def is_nameless(name: str) -> bool:
+    """Return whether a simplified heading says nothing about a quantity: none, a bare axis, or a column's label."""
+    return re.fullmatch(LABEL, name.partition(" ")[0]) is not None

@@ -6,6 +6,7 @@ gravity determines the gyroscope's unit.
 """
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -75,14 +76,14 @@ def guess(shape: Shape, still_until_s: float) -> Guess:
             raise NoShape(f"only {number} of its lines came {when}")
     count = shape.values.shape[1]
     result = Guess(["-"] * count)
-    known_columns = _match_names(shape.names)
+    known_columns = match_names(shape.names)
     for index, name in known_columns.items():
         result.columns[index] = name
     text_columns = [index for index in range(count) if np.isnan(shape.values[:, index]).any()]
     result.reasons += [f"column {index + 1} is text, or empty at times: it is not read" for index in text_columns]
     _find_time(shape, result)
-    _find_triads(shape, result, shape.arrived_s < still_until_s)
-    _find_temperature(shape, result, shape.arrived_s < still_until_s)
+    find_triads(shape, result, shape.arrived_s < still_until_s)
+    find_temperature(shape, result, shape.arrived_s < still_until_s)
     for index, name in enumerate(result.columns):
         if name == "-" and index not in text_columns:
             about = f"{np.median(shape.values[:, index]):g}"
@@ -97,23 +98,7 @@ def guess(shape: Shape, still_until_s: float) -> Guess:
     return result
 
 
-def guess_triads(names: tuple[str, ...], values: Array, still: Flags, rate_hz: float) -> Guess:
-    """Guess which columns of readings (n, k) at a given rate are triads of sensors, and their units.
-
-    `still` (n,) marks the rows at rest; if it marks none, all rows count as at rest.
-    """
-    count = values.shape[1]
-    still = still if still.any() else np.ones(len(values), dtype=np.bool_)
-    shape = Shape("", "", (), False, names, values, np.arange(len(values)) / rate_hz, (-1,) * count, 0)
-    result = Guess(["-"] * count, rate_hz)
-    for index, name in _match_names(names).items():
-        result.columns[index] = "-" if name in ("time", "sequence") else name
-    _find_triads(shape, result, still)
-    _find_temperature(shape, result, still)
-    return result
-
-
-def _match_names(names: tuple[str, ...]) -> dict[int, str]:
+def match_names(names: tuple[str, ...]) -> dict[int, str]:
     """Return the names of columns in a header, by index; duplicates are ignored."""
     names_by_index: dict[int, str] = {}
     for index, name in enumerate(names):
@@ -195,9 +180,12 @@ def _unit_of_time(steps: Array, interval_s: float) -> str | None:
     return None
 
 
-def _find_triads(shape: Shape, guess: Guess, still: Flags) -> None:
-    """Find unnamed triads of adjacent columns by their norms at rest and in rotation."""
-    for start in range(shape.values.shape[1] - 2):
+def find_triads(shape: Shape, guess: Guess, still: Flags, starts: Iterable[int] | None = None) -> None:
+    """Find unnamed triads of adjacent columns by their norms at rest and in rotation.
+
+    `starts`: the columns with which a triad may begin, all if None.
+    """
+    for start in range(shape.values.shape[1] - 2) if starts is None else starts:
         places = slice(start, start + 3)
         if guess.columns[places] != ["-"] * 3 or np.isnan(shape.values[:, places]).any():
             continue
@@ -318,7 +306,7 @@ def _rate_unit(shape: Shape, guess: Guess, rates: Array, still: Flags) -> tuple[
     return None
 
 
-def _find_temperature(shape: Shape, guess: Guess, still: Flags) -> None:
+def find_temperature(shape: Shape, guess: Guess, still: Flags) -> None:
     """Take the first column without a name, with a mean of 10 to 60 and small changes, as the temperature in °C."""
     if "temperature" in guess.columns:
         return

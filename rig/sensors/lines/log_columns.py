@@ -11,12 +11,15 @@ from numpy.typing import NDArray
 from rig.config.units import UNITS
 from rig.data.quantity import MAX_TEMPERATURE_C
 from rig.data.recording.motion_file import MOTIONS, QUATERNION
+from rig.errors.quoting import shorten
 from rig.estimation.arrays import Array
 from rig.observation.formats.table_layout import TableLayout
 from rig.sensors.lines.column_attitudes import describe_unread_attitudes, find_matrices, find_quaternion, list_angles
+from rig.sensors.lines.column_exclusions import find_virtual
 from rig.sensors.lines.column_names import AXES, order_axes, simplify_heading, state_unit
+from rig.sensors.lines.column_triads import guess_triads
 from rig.sensors.lines.column_units import BY_SIZE, MAX_SCALE_ERROR, SI_UNITS, UNSTATED, choose_unit, compare_stated
-from rig.sensors.lines.guessing import Guess, guess_triads
+from rig.sensors.lines.guessing import Guess
 
 NAMES = {"g": "_rad_s", "a": "_m_s2", "m": "_t"}
 SENSORS = {"g": "gyroscope", "a": "accelerometer", "m": "magnetometer"}
@@ -29,7 +32,11 @@ REFERENCE = {name for group in MOTIONS["attitudes"].optional for name in group} 
 REPEATED = "repeated"
 TIME_NAME = re.compile(r"time|stamp", re.IGNORECASE)
 POSITION_NAME = re.compile(r"(?:(?:p|t|pos|position|trans|translation)_?)?[xyz](?: \[.*\])?")
-FIELD_NAME = re.compile(r".*(mag|field|compass)|[bhm]_?[xyz]\b", re.IGNORECASE)
+STATE_UNIT = (
+    ". State the unit of the first three in the map, where x_rad_s y_rad_s z_rad_s mean a gyroscope: write x_t y_t z_t "
+    "for a magnetometer, x_m_s2 y_m_s2 z_m_s2 for an accelerometer"
+)
+ADD_TO_MAP = ". They are not read: add a gyroscope to the map as x_rad_s y_rad_s z_rad_s, a magnetometer as x_t y_t z_t"
 
 ColumnEntry = Mapping[str, Any]  # a column's entry: its name or number, and its unit
 
@@ -38,13 +45,15 @@ ColumnEntry = Mapping[str, Any]  # a column's entry: its name or number, and its
 class LogColumns:
     """The columns of a log: maps of `samples` and `motion`, in the form of the file of `--columns`.
 
-    `gaps`: sentences on properties of the columns that are unknown; `others`: the columns that are not read.
+    `gaps`: sentences on properties of the columns that are unknown; `others`: the columns that are not read;
+    `reasons`: sentences on why some of these look like readings and are not read.
     """
 
     samples: Mapping[str, ColumnEntry]
     motion: Mapping[str, ColumnEntry]
     gaps: Sequence[str] = ()
     others: Sequence[str] = ()
+    reasons: Sequence[str] = ()
 
     def correct_rate_unit(self, ratio: float) -> "LogColumns":
         """Return the columns with the gyroscope's unit corrected, if it was guessed by size alone.
@@ -73,10 +82,11 @@ class _ColumnGroup:
     still: NDArray[np.bool_]
 
 
-def guess_columns(layout: TableLayout, values: Array, time: Array | None) -> LogColumns:
+def guess_columns(layout: TableLayout, values: Array, time: Array | None, title: str = "") -> LogColumns:
     """Return a guess at the meaning of a log's columns, from their `layout` and their numbers `values` (n, k).
 
-    `time` (n,) is in the layout's unit, None without times. Values may be NaN in rows that belong to other sensors.
+    `title`: the file's name without its extension. `time` (n,) is in the layout's unit, None without times. Values may
+    be NaN in rows that belong to other sensors.
     """
     unit_s = 1.0 if layout.time_unit is None else UNITS[layout.time_unit].size
     matrices = find_matrices(layout, values if time is None else _insert_time(layout, values, time))
@@ -84,20 +94,23 @@ def guess_columns(layout: TableLayout, values: Array, time: Array | None) -> Log
         layout, time = replace(layout, time=None, time_unit=None), None
     rate_hz = ASSUMED_RATE_HZ if time is None else _mean_rate_hz(unit_s * time)
     quaternion = find_quaternion(layout, values, matrices)
-    samples, gaps = _guess_samples(layout, values, {*quaternion.values(), *matrices}, rate_hz)
+    virtual, reasons = find_virtual(layout, values, title)
+    samples, gaps = _guess_samples(layout, values, {*quaternion.values(), *matrices}, virtual, rate_hz)
     if layout.time is None:
         gaps.append("no column of time: state samples_rate_hz")
     unread = [] if quaternion else describe_unread_attitudes(layout, matrices, list_angles(layout))
     gaps += unread
-    if not samples and not quaternion and not unread:
-        gaps.append(
-            "which columns are readings: none look like a sensor's. State them with --columns. If numbers have a "
-            "decimal comma, divide the columns by semicolons"
-        )
     timed = {} if layout.time is None else {"time_s": _time_entry(layout, time)}
     motion = {name: {"column": layout.name(index), "unit": "1"} for name, index in quaternion.items()}
     others = _list_others(layout, [*samples.values(), *motion.values(), *timed.values()])
-    return LogColumns({**timed, **samples} if samples else {}, {**timed, **motion} if motion else {}, gaps, others)
+    if not any((samples, quaternion, unread, reasons)):
+        which = f"what {shorten(' '.join(others))} are" if others else "which columns are readings"
+        gaps.append(
+            f"{which}: none look like a sensor's. State them with --columns. If numbers have a decimal comma, divide "
+            "the columns by semicolons"
+        )
+    samples, motion = ({**timed, **entries} if entries else {} for entries in (samples, motion))
+    return LogColumns(samples, motion, gaps, others, reasons)
 
 
 def _insert_time(layout: TableLayout, values: Array, time: Array) -> Array:
@@ -106,7 +119,7 @@ def _insert_time(layout: TableLayout, values: Array, time: Array) -> Array:
 
 
 def _guess_samples(
-    layout: TableLayout, values: Array, attitudes: set[int], rate_hz: float
+    layout: TableLayout, values: Array, attitudes: set[int], virtual: set[int], rate_hz: float
 ) -> tuple[dict[str, ColumnEntry], list[str]]:
     """Return the column map of the readings, and sentences on doubtful columns.
 
@@ -114,16 +127,10 @@ def _guess_samples(
     """
     samples: dict[str, ColumnEntry] = {}
     gaps: list[str] = []
-    for group in _group_columns(layout, values, attitudes, rate_hz):
-        guessed = guess_triads(group.names, group.values, group.still, rate_hz)
-        if not samples and _is_undetermined(group.names, guessed):
-            columns = [layout.name(index) for index in group.indices]
-            samples |= {
-                axis + NAMES["g"]: {"column": column, "unit": UNSTATED}
-                for axis, column in zip(AXES, columns, strict=True)
-            }
-            gaps.append(_describe_undetermined(columns, group.values))
-            continue
+    undetermined: list[tuple[list[str | int], Array]] = []
+    for group in _group_columns(layout, values, attitudes, virtual, rate_hz):
+        guessed, triads = guess_triads(group.names, group.indices, group.values, group.still, rate_hz)
+        undetermined += [([layout.name(group.indices[i]) for i in triad], group.values[:, triad]) for triad in triads]
         for kind in [kind for kind in NAMES if kind in guessed.units and f"x{NAMES[kind]}" not in samples]:
             triad, reason = _map_triad(layout, group, guessed, kind)
             samples |= triad
@@ -139,26 +146,20 @@ def _guess_samples(
                 gaps.append(
                     f"the unit of the temperature {column}, up to {largest:.4g}: convert it to °C; it is not read"
                 )
+    if undetermined:
+        is_first = not any(f"x{suffix}" in samples for suffix in NAMES.values())
+        gaps.append(_describe_undetermined(undetermined) + (STATE_UNIT if is_first else ADD_TO_MAP))
+        if is_first:
+            columns = zip(AXES, undetermined[0][0], strict=True)
+            samples |= {axis + NAMES["g"]: {"column": column, "unit": UNSTATED} for axis, column in columns}
     return samples, gaps
 
 
-def _is_undetermined(names: Sequence[str], guessed: Guess) -> bool:
-    """Return whether neither headings nor numbers show what three columns are.
-
-    The size of a magnetic field alone does not show it, because other readings may have the same size.
-    """
-    is_named = any(FIELD_NAME.match(name) for name in names) and bool(guessed.units)
-    return not is_named and len(names) == 3 and set(guessed.units) <= {"m"}
-
-
-def _describe_undetermined(columns: Sequence[str | int], values: Array) -> str:
-    """Return a sentence on three unknown columns with `values` (n, 3): what they may be, and how to state it."""
-    size = float(np.median(np.linalg.norm(values, axis=1)))
-    return (
-        f"what {' '.join(map(str, columns))} are: no heading says it; their size is about {size:.3g}, and the Earth's "
-        "field is 25 to 65 uT. State their unit in the map, where x_rad_s y_rad_s z_rad_s mean a gyroscope: write "
-        "x_t y_t z_t for a magnetometer, x_m_s2 y_m_s2 z_m_s2 for an accelerometer"
-    )
+def _describe_undetermined(triads: Sequence[tuple[Sequence[str | int], Array]]) -> str:
+    """Return a sentence on columns that neither headings nor numbers show, three of values (n, 3) each."""
+    columns = " ".join(str(column) for names, _ in triads for column in names)
+    sizes = ", ".join(f"{np.median(np.linalg.norm(values, axis=1)):.3g}" for _, values in triads)
+    return f"what {columns} are: no heading says it; their size is about {sizes}, and the Earth's field is 25 to 65 uT"
 
 
 def _map_triad(
@@ -209,15 +210,18 @@ def _mean_rate_hz(time_s: Array) -> float:
     return 1 / float(np.mean(steps[steps <= np.quantile(steps, 0.99)])) if len(steps) else ASSUMED_RATE_HZ
 
 
-def _group_columns(layout: TableLayout, values: Array, attitudes: set[int], rate_hz: float) -> Iterator[_ColumnGroup]:
+def _group_columns(
+    layout: TableLayout, values: Array, attitudes: set[int], virtual: set[int], rate_hz: float
+) -> Iterator[_ColumnGroup]:
     """Yield the columns that may be readings, in groups whose columns have numbers in the same rows.
 
     There is one group for each rate of the logger. Columns of a reference are left out, including its positions if the
     log has attitudes, because positions look like readings. Constant columns are left out too, and so are counters,
     such as the numbers of the rows and a second clock, and durations.
     """
-    names = _name_once([simplify_heading(layout, index) for index in range(len(layout.headings))])
-    used = {layout.time, *attitudes, *(i for i, name in enumerate(layout.headings) if name in REFERENCE)}
+    headings = range(len(layout.headings))
+    names = _name_once(["" if index in virtual else simplify_heading(layout, index) for index in headings])
+    used = {layout.time, *attitudes, *virtual, *(i for i, name in enumerate(layout.headings) if name in REFERENCE)}
     used |= {*list_angles(layout), *(i for i, name in enumerate(layout.headings) if TIME_NAME.search(name))}
     if attitudes:
         used |= {index for index, name in enumerate(names) if POSITION_NAME.fullmatch(name)}

@@ -63,3 +63,47 @@ def test_units_in_words_are_read_and_m_s2_is_no_other_unit_than_m_s_squared(
 def test_an_accelerometer_that_reads_0_93_at_rest_is_nearest_to_g(tmp_path: Path) -> None:
     guessed = guess(tmp_path / "log.csv", "time,ax,ay,az", TIME_S, 0.093 * FORCES)
     assert guessed.samples["x_m_s2"]["unit"] == "g" and any("nearest to 1 g in g" in gap for gap in guessed.gaps)
+
+
+@pytest.mark.parametrize(
+    ("file", "names", "readings", "reason"),
+    [
+        ("log.csv", "LINEAR ACCELERATION {}", np.subtract(FORCES, [0.0, 1.0, 9.75]), "gravity is removed"),
+        ("log.csv", "FreeAcc_{}", FORCES, "gravity is removed"),
+        ("Gravity.csv", "{}", FORCES, "gravity is computed"),
+        ("log.csv", "imu.linear_acceleration.{}", FORCES, ""),
+    ],
+)
+def test_accelerations_without_gravity_are_not_read(
+    file: str, names: str, readings: Array, reason: str, tmp_path: Path
+) -> None:
+    heading = ",".join(["time", *map(names.format, "xyz")])
+    guessed = guess(tmp_path / file, heading, TIME_S, readings)
+    assert ("x_m_s2" in guessed.samples) == (not reason)
+    assert reason in "".join(guessed.reasons) and bool(guessed.reasons) == bool(reason)
+
+
+def test_the_unit_in_a_heading_counts_more_than_a_letter(tmp_path: Path) -> None:
+    guessed = guess(tmp_path / "log.csv", "time,fx_uT,fy_uT,fz_uT", TIME_S, 4 * FORCES)
+    assert "x_t" in guessed.samples and "x_m_s2" not in guessed.samples
+
+
+def test_three_columns_with_names_of_other_things_are_no_gyroscope(tmp_path: Path) -> None:
+    heading = "time,right knee,left knee,right hip,left hip"
+    guessed = guess(tmp_path / "log.csv", heading, TIME_S, 50 * RATES, 50 * RATES[:, 0])
+    assert not guessed.samples and any(
+        "what right knee left knee right hip left hip are" in gap for gap in guessed.gaps
+    )
+
+
+def test_columns_without_a_heading_are_taken_by_threes_and_only_if_gravity_shows_them(tmp_path: Path) -> None:
+    field = Rotation.from_rotvec(ANGLES).inv().apply([20.0, 0.0, -40.0]) + 0.1 * NOISE
+    guessed = guess(tmp_path / "log.csv", "", TIME_S, FORCES, RATES, field)
+    assert [guessed.samples[f"x_{unit}"]["column"] for unit in ("m_s2", "rad_s", "t")] == [2, 5, 8] and not guessed.gaps
+    for forces, rates, field_read in ((0.083 * FORCES, 100 * RATES[::-1], field), (FORCES[:, ::-1] - 8, NOISE, field)):
+        guessed = guess(tmp_path / "log.csv", "", TIME_S, forces, rates, field_read)
+        assert all(entry.get("unit") == "?" for name, entry in guessed.samples.items() if name != "time_s")
+        (gap,) = guessed.gaps
+        assert gap.startswith("what 2 3 4 5 6 7 8 9 10 are: no heading says it")
+    guessed = guess(tmp_path / "log.csv", "", TIME_S, RATES[:, :1], FORCES, RATES)
+    assert "x_m_s2" not in guessed.samples, "no three begin at the second reading"
