@@ -1,15 +1,19 @@
 """Columns of an unknown log whose names are those of a sensor, but that are not read, and why."""
 
 import re
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
 from rig.estimation.arrays import Array
 from rig.observation.formats.table_layout import TableLayout
+from rig.sensors.lines.column_names import AXES, find_axis, simplify_heading
 from rig.sensors.lines.column_units import GRAVITY_BY_UNIT
 
+SENSORS = {"g": "gyroscope", "a": "accelerometer", "m": "magnetometer"}
 VIRTUAL_NAME = re.compile(r"(?P<gravity>gravity)|(?P<linear>lin(ear)?[ _.]*acc)|(free|user)[ _.]*acc", re.IGNORECASE)
 WITH_GRAVITY = re.compile(r"(incl\w*|with)[ _]*gravity", re.IGNORECASE)
+MIN_STEPS, MIN_RISING = 10, 0.9  # of a counter; fraction of steps that rise; none may fall
 LEAST_GRAVITY = 0.7  # fraction of 1 g that remains in an accelerometer's median reading
 
 
@@ -39,3 +43,54 @@ def _has_gravity(values: Array) -> bool:
     """Return whether the median size of readings (n, k) is near gravity in some unit."""
     level = float(np.nanmedian(np.linalg.norm(values[:, :3], axis=1)))
     return any(LEAST_GRAVITY < level / size < 1 / LEAST_GRAVITY for size in GRAVITY_BY_UNIT.values())
+
+
+def explain_unread(
+    layout: TableLayout, values: Array, used: Collection[int | None], read: Collection[str | int]
+) -> list[str]:
+    """Return a sentence on each three columns that a sensor's name and its axes name, but that are not `read`.
+
+    `used`: columns with another meaning.
+    """
+    columns: dict[tuple[str, str], list[int]] = {}
+    for index in range(len(layout.headings)):
+        if index not in used and (axis := find_axis(simplify_heading(layout, index))) is not None:
+            columns.setdefault(axis, []).append(index)
+    triads = {kind: [*zip(*(columns.get((kind, axis), []) for axis in AXES), strict=False)] for kind in SENSORS}
+    reasons: list[str] = []
+    for kind, sensors in triads.items():
+        is_kind_read = any(layout.name(index) in read for triad in sensors for index in triad)
+        reasons += [
+            f"{' '.join(layout.headings[index] for index in triad)} are not read: "
+            + _explain_triad(layout, values, triad, SENSORS[kind] if is_kind_read else "")
+            for triad in sensors
+            if not any(layout.name(index) in read for index in triad)
+        ]
+    return reasons
+
+
+def _explain_triad(layout: TableLayout, values: Array, triad: Sequence[int], sensor_read: str) -> str:
+    """Return why three columns are not read; `sensor_read`: the sensor of their kind that is read, or ""."""
+    headings = layout.headings
+    if texts := [headings[index] for index in triad if index not in layout.numbers]:
+        return f"not all cells of {' '.join(texts)} are numbers"
+    if steady := [headings[index] for index in triad if is_constant(values[:, index])]:
+        return f"the numbers of {' '.join(steady)} never change"
+    if counters := [headings[index] for index in triad if is_counter(values[:, index])]:
+        return f"the numbers of {' '.join(counters)} rise from row to row, as a counter's"
+    if sensor_read:
+        return f"they are a second {sensor_read}, and of each kind one is read"
+    if len({np.isfinite(values[:, index]).tobytes() for index in triad}) > 1:
+        return "their numbers are in different rows"
+    return "other columns are named alike"
+
+
+def is_constant(column: Array) -> bool:
+    """Return whether all numbers of a column are the same."""
+    return bool(np.nanmin(column) == np.nanmax(column))
+
+
+def is_counter(column: Array) -> bool:
+    """Return whether a column rises from row to row, as the numbers of the rows or a second clock do."""
+    steps = np.diff(column[np.isfinite(column)])
+    return len(steps) > MIN_STEPS and bool((steps >= 0).all() and (steps > 0).mean() > MIN_RISING)

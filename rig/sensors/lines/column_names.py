@@ -5,7 +5,9 @@ from collections.abc import Sequence
 
 from rig.config.units import UNITS, find_unit
 from rig.observation.formats.table_layout import TableLayout
+from rig.sensors.lines.guessing import match_names
 
+REPEATED = "repeated"
 AXES = ("x", "y", "z")
 TEMPERATURE_WORDS = {"temp", "temperature"}
 BRACKETED_CELSIUS = re.compile(r"[\[(]\s*(°|deg ?)?C\s*[\])]")
@@ -111,3 +113,15 @@ def is_axis(name: str) -> bool:
 def is_nameless(name: str) -> bool:
     """Return whether a simplified heading says nothing about a quantity: none, a bare axis, or a column's label."""
     return re.fullmatch(LABEL, name.partition(" ")[0]) is not None
+
+
+def find_axis(name: str) -> tuple[str, str] | None:
+    """Return the sensor, "g", "a" or "m", and the axis that a simplified heading names, or None."""
+    column = match_names((name,)).get(0, "")
+    return (column[0], column[1]) if len(column) == 2 else None
+
+
+def mark_repeated(names: Sequence[str]) -> list[str]:
+    """Return the names with repeated ones marked, so that of two sensors of one kind the first is read."""
+    keys = [find_axis(name) or name for name in names]
+    return [f"{REPEATED} {name}" if name and keys[index] in keys[:index] else name for index, name in enumerate(names)]

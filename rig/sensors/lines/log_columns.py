@@ -15,21 +15,18 @@ from rig.errors.quoting import shorten
 from rig.estimation.arrays import Array
 from rig.observation.formats.table_layout import TableLayout
 from rig.sensors.lines.column_attitudes import describe_unread_attitudes, find_matrices, find_quaternion, list_angles
-from rig.sensors.lines.column_exclusions import find_virtual
-from rig.sensors.lines.column_names import AXES, order_axes, simplify_heading, state_unit
+from rig.sensors.lines.column_exclusions import SENSORS, explain_unread, find_virtual, is_constant, is_counter
+from rig.sensors.lines.column_names import AXES, mark_repeated, order_axes, simplify_heading, state_unit
 from rig.sensors.lines.column_triads import guess_triads
 from rig.sensors.lines.column_units import BY_SIZE, MAX_SCALE_ERROR, SI_UNITS, UNSTATED, choose_unit, compare_stated
 from rig.sensors.lines.guessing import Guess
 
 NAMES = {"g": "_rad_s", "a": "_m_s2", "m": "_t"}
-SENSORS = {"g": "gyroscope", "a": "accelerometer", "m": "magnetometer"}
 ASSUMED_RATE_HZ = 100.0  # of a log without times
 # A block is at rest if its scatter is at most this many times that of the quietest tenth.
 BLOCK_S, QUIETEST_FRACTION, QUIET_RATIO = 0.25, 0.1, 3.0
 MAX_WRAP_STEPS = 20.0  # from the last stamp before a restart to the restart
-MIN_STEPS, MIN_RISING = 10, 0.9  # of a counter; fraction of steps that rise; none may fall
 REFERENCE = {name for group in MOTIONS["attitudes"].optional for name in group} | {"start_s", "end_s"}
-REPEATED = "repeated"
 TIME_NAME = re.compile(r"time|stamp", re.IGNORECASE)
 POSITION_NAME = re.compile(r"(?:(?:p|t|pos|position|trans|translation)_?)?[xyz](?: \[.*\])?")
 STATE_UNIT = (
@@ -109,6 +106,8 @@ def guess_columns(layout: TableLayout, values: Array, time: Array | None, title:
             f"{which}: none look like a sensor's. State them with --columns. If numbers have a decimal comma, divide "
             "the columns by semicolons"
         )
+    read = {entry["column"] for entry in [*samples.values(), *timed.values()]}
+    reasons += explain_unread(layout, values, {layout.time, *virtual, *matrices, *quaternion.values()}, read)
     samples, motion = ({**timed, **entries} if entries else {} for entries in (samples, motion))
     return LogColumns(samples, motion, gaps, others, reasons)
 
@@ -187,11 +186,6 @@ def _list_others(layout: TableLayout, entries: Sequence[ColumnEntry]) -> list[st
     ]
 
 
-def _name_once(names: list[str]) -> list[str]:
-    """Return the names with repeated ones marked, so that of two sensors with the same names the first is read."""
-    return [f"{REPEATED} {name}" if name and name in names[:index] else name for index, name in enumerate(names)]
-
-
 def find_still(values: Array, rate_hz: float) -> NDArray[np.bool_]:
     """Return a mask (n,) of rows at rest: each column scatters little more in their block than in the quietest one."""
     width = max(int(BLOCK_S * rate_hz), 5)
@@ -220,7 +214,7 @@ def _group_columns(
     such as the numbers of the rows and a second clock, and durations.
     """
     headings = range(len(layout.headings))
-    names = _name_once(["" if index in virtual else simplify_heading(layout, index) for index in headings])
+    names = mark_repeated(["" if index in virtual else simplify_heading(layout, index) for index in headings])
     used = {layout.time, *attitudes, *virtual, *(i for i, name in enumerate(layout.headings) if name in REFERENCE)}
     used |= {*list_angles(layout), *(i for i, name in enumerate(layout.headings) if TIME_NAME.search(name))}
     if attitudes:
@@ -229,23 +223,13 @@ def _group_columns(
         used |= {index for index, name in enumerate(names) if not name}
     groups: dict[bytes, list[int]] = {}
     for index in layout.numbers:
-        if index not in used and not _is_constant(values[:, index]) and not _is_counter(values[:, index]):
+        if index not in used and not is_constant(values[:, index]) and not is_counter(values[:, index]):
             groups.setdefault(np.isfinite(values[:, index]).tobytes(), []).append(index)
     for group in groups.values():
         indices = order_axes(group, names)
         part = values[np.isfinite(values[:, indices[0]])][:, indices]
         still = find_still(part, rate_hz * len(part) / max(len(values), 1))
         yield _ColumnGroup(indices, tuple(names[index] for index in indices), part, still)
-
-
-def _is_constant(column: Array) -> bool:
-    return bool(np.nanmin(column) == np.nanmax(column))
-
-
-def _is_counter(column: Array) -> bool:
-    """Return whether a column rises from row to row, as the numbers of the rows or a second clock do."""
-    steps = np.diff(column[np.isfinite(column)])
-    return len(steps) > MIN_STEPS and bool((steps >= 0).all() and (steps > 0).mean() > MIN_RISING)
 
 
 def _time_entry(layout: TableLayout, time: Array | None) -> dict[str, Any]:

@@ -107,3 +107,20 @@ def test_columns_without_a_heading_are_taken_by_threes_and_only_if_gravity_shows
         assert gap.startswith("what 2 3 4 5 6 7 8 9 10 are: no heading says it")
     guessed = guess(tmp_path / "log.csv", "", TIME_S, RATES[:, :1], FORCES, RATES)
     assert "x_m_s2" not in guessed.samples, "no three begin at the second reading"
+
+
+@pytest.mark.parametrize(
+    ("names", "is_stuck", "reason"),
+    [
+        ("WatchGyro", False, "they are a second gyroscope, and of each kind one is read"),
+        ("WatchAcc", True, "the numbers of WatchAccX never change"),
+    ],
+)
+def test_three_columns_of_a_sensor_that_are_not_read_are_listed_with_the_reason(
+    names: str, is_stuck: bool, reason: str, tmp_path: Path
+) -> None:
+    heading = ",".join(["time", *(f"{name}{axis}" for name in ("Gyro", names) for axis in "XYZ")])
+    other = FORCES * [0, 1, 1] if is_stuck else 2 * RATES
+    guessed = guess(tmp_path / "log.csv", heading, TIME_S, RATES, other)
+    assert guessed.samples["x_rad_s"]["column"] == "GyroX"
+    assert guessed.reasons == [f"{names}X {names}Y {names}Z are not read: {reason}"]
