@@ -40,8 +40,10 @@ def simplify_heading(layout: TableLayout, index: int) -> str:
     words = _strip_units(_divide_axis(words))
     if words and words[-1] not in AXES and words[0] in AXES:
         words = [*words[1:], words[0]]
-    if words and words[-1] in AXES and (kind := _find_kind(words[:-1], unit)):
-        words = [kind, words[-1]]
+    axes = [word for word in words if word in AXES]
+    before = [word for word in words if word not in AXES]
+    if len(axes) == 1 and (kind := _find_kind(before, unit)):  # X Gyro, acc_x_raw
+        words = [kind, axes[0]]
     return "_".join(words) + (f" [{unit}]" if unit else "")
 
 

@@ -124,3 +124,9 @@ def test_three_columns_of_a_sensor_that_are_not_read_are_listed_with_the_reason(
     guessed = guess(tmp_path / "log.csv", heading, TIME_S, RATES, other)
     assert guessed.samples["x_rad_s"]["column"] == "GyroX"
     assert guessed.reasons == [f"{names}X {names}Y {names}Z are not read: {reason}"]
+
+
+@pytest.mark.parametrize("name", ["gyro_{}_filtered", "{} Gyro", "SENSgyro.{}", "w_RS_S_{} [rad s^-1]"])
+def test_an_axis_may_be_anywhere_in_the_name_of_a_sensor(name: str, tmp_path: Path) -> None:
+    heading = ",".join(["time", *map(name.format, "xyz")])
+    assert "x_rad_s" in guess(tmp_path / "log.csv", heading, TIME_S, RATES).samples
