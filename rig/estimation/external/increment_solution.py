@@ -258,7 +258,7 @@ def _check_identified(matrix: Array, covariance: Array) -> None:
         f"a turn about {'xyz'[axis]} reads {sizes[axis]:.4g} ± {2 * std[axis]:.1g} times as large"
         for axis in np.flatnonzero(~unknown)
     )
-    cause = f"the body hardly turned about {names}" + (", or the attitudes contradict the readings" * unknown.all())
+    cause = f"the body hardly turned about {names}" + ", or the attitudes contradict the readings" * bool(unknown.all())
     what = f"{cause}: the sensor's response to that is known to {std.max():.2g}"
     raise Fault("ill_conditioned", f"{what}{f'; {identified}' if identified else ''}", REMEDY)
 
