@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 MIN_SIZE = 1e-200  # a smaller uncertainty counts as zero: division by it would overflow
 BISECTION_STEPS = 30
+MAD_TO_STD = 1.4826  # standard deviation over median absolute deviation, of normal errors
 
 
 def scale_of(matrix: Array) -> Array:

@@ -6,6 +6,7 @@ from rig.data.quantity import RATE
 from rig.data.recording.run_data import RunData
 from rig.data.recording.settings import ObservationThresholds
 from rig.errors import Fault
+from rig.estimation.arrays import MAD_TO_STD
 from rig.observation.arm_rests import average_rests
 from rig.observation.average import Stream, slice_time, synchronize_stream
 from rig.observation.finished_steps import complete_dwells, complete_sweeps
@@ -65,4 +66,4 @@ def _has_spike(stream: Stream, window: Window) -> bool:
     if not len(counts):
         return False
     deviation = np.abs(counts - np.median(counts, axis=0))
-    return bool(np.any(deviation > SPIKE_STDS * np.maximum(1.4826 * np.median(deviation, axis=0), 0.5)))
+    return bool(np.any(deviation > SPIKE_STDS * np.maximum(MAD_TO_STD * np.median(deviation, axis=0), 0.5)))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rig.data.quantity import Quantity
 from rig.data.recording.recorded_sensor import RecordedSensor
-from rig.estimation.arrays import Array, median
+from rig.estimation.arrays import MAD_TO_STD, Array, median
 from rig.estimation.statistics.rounding import Steps
 from rig.observation.consistency.raw_readings import PREDICTOR_ORDER, RawReadings, innovation_std
 from rig.observation.sound_steps import SPIKE_STDS
@@ -155,7 +155,7 @@ def _find_spikes(windows: Sequence[RawReadings], step_counts: Array) -> tuple[fl
     deviations_by_window = [
         (window.residual_counts - median(window.residual_counts, axis=0))[SETTLING_READINGS:] for window in windows
     ]
-    noises = [np.maximum(1.4826 * median(np.abs(deviations), axis=0), half) for deviations in deviations_by_window]
+    noises = [np.maximum(MAD_TO_STD * median(np.abs(deviations), axis=0), half) for deviations in deviations_by_window]
     informative = [
         noise
         for deviations, noise in zip(deviations_by_window, noises, strict=True)
@@ -181,7 +181,7 @@ def _find_scatter_around(deviations: Array) -> Array:
     """Return the scatter (n, 3) of the readings near each reading; within a burst of vibration it is large."""
     sizes = np.pad(np.abs(deviations), ((BURST_READINGS, BURST_READINGS), (0, 0)), mode="reflect")
     around = np.lib.stride_tricks.sliding_window_view(sizes, 2 * BURST_READINGS + 1, axis=0)
-    scatter: Array = 1.4826 * median(around)
+    scatter: Array = MAD_TO_STD * median(around)
     return scatter
 
 

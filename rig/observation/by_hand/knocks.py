@@ -4,8 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.data.quantity import Quantity
-from rig.estimation.arrays import Array
-from rig.observation.by_hand.steadiness import MAD_TO_STD
+from rig.estimation.arrays import MAD_TO_STD, Array
 
 KNOCK_STDS = 8.0  # deviation beyond which it is not noise
 COARSE_STEPS = 2.0  # deviation in steps of the readings: noise below the resolution deviates by as much

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from rig.data.quantity import Quantity
 from rig.errors import Fault
-from rig.estimation.arrays import Array, interpolate
+from rig.estimation.arrays import MAD_TO_STD, Array, interpolate
 from rig.observation.time_stamps.sampling import Sampling
 
 BLOCK_S = 1.0
@@ -16,7 +16,6 @@ MAX_NOISE_STDS = 6.0  # difference due to noise
 MAX_GAP_S, MAX_GAP_FRACTION = 0.25, 0.01  # at rest: longer gaps are not ignored; readings missing in such gaps
 MAX_SCATTER_RATIO = 10.0  # noise of readings, relative to the quantity's largest change from second to second
 REMEDY = "Give a log of a sensor that lay still all the time; cut off its beginning and its end, where it was moved"
-MAD_TO_STD = 1.4826  # standard deviation over median absolute deviation
 
 
 def contiguous_slices(time_s: Array, sampling: Sampling) -> Iterator[slice]:

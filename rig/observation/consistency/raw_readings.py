@@ -7,13 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.data.quantity import Quantity
-from rig.estimation.arrays import Array, median
+from rig.estimation.arrays import MAD_TO_STD, Array, median
 from rig.observation.average import Stream
 from rig.observation.statistics.coloured_noise import innovations
 
 REST = -1  # instead of the index of a revolution
 PREDICTOR_ORDER = 12  # earlier readings from which a reading is predicted
-MAD_TO_STD = 1.4826  # standard deviation over median absolute deviation
 
 
 @dataclass(frozen=True, slots=True)
