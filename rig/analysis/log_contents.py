@@ -108,9 +108,8 @@ def correct_rate_unit(looked: LookedFile, ratio: float) -> LookedFile:
     ):
         return looked
     columns = _map_of(looked.layout, guess)
-    corrected = LookedFile(looked.path, looked.layout, guess, columns)
-    column_map = ColumnMap.model_validate(columns)
-    return _read_contents(corrected, column_map, has_readings=True, has_attitudes=looked.attitudes is not None)
+    corrected = replace(looked, guess=guess, columns=columns)
+    return _read_contents(corrected, ColumnMap.model_validate(columns), has_readings=True, has_attitudes=False)
 
 
 def is_incomplete(columns: Mapping[str, Any]) -> bool:
@@ -175,8 +174,7 @@ def _read_contents(looked: LookedFile, column_map: ColumnMap, *, has_readings: b
     if has_attitudes:
         try:
             attitudes = read_attitudes(looked.path, map_motion(column_map), inverse=column_map.motion_inverse)
-            numbers, omitted = select_reports(attitudes)
-            reported = {name: column[numbers - 1] for name, column in attitudes.items()}
+            reported, _, omitted = select_reports(attitudes)
             looked = replace(looked, attitudes=reported, omitted_attitudes=omitted)
         except RigError as error:
             refusals.append(error)

@@ -140,8 +140,7 @@ def average_placements(samples: Samples, table: Mapping[str, Array], *, find_clo
     """
     time_s, readings = samples.time_s, samples.readings
     hides_losses = samples.sampling is not None and samples.sampling.hides_losses
-    numbers, not_reported = select_reports(table)
-    table = {name: column[numbers - 1] for name, column in table.items()}
+    table, numbers, not_reported = select_reports(table)
     rates = np.column_stack([table[name] for name in RATE_COLUMNS]) if RATE_COLUMNS[0] in table else None
     windows = _windows(table)
     all_rows = rows_found = _ReferenceRows(windows, _rotations(table), rates, _attitude_std(table), numbers)
@@ -212,25 +211,25 @@ class _ReferenceRows:
         return _ReferenceRows([self.windows[row] for row in rows], self.attitudes[rows], rates, std, self.numbers[rows])
 
 
-def select_reports(rows: Mapping[str, Array]) -> tuple[NDArray[np.intp], tuple[Omitted, ...]]:
-    """Return the numbers, from 1, of the attitudes that the reference reported, and the rows that are left out.
+def select_reports(rows: Mapping[str, Array]) -> tuple[dict[str, Array], NDArray[np.intp], tuple[Omitted, ...]]:
+    """Return the attitudes that the reference reported, their numbers in the file, from 1, and what is left out.
 
-    Left out are rows that were interpolated between reports, rows of zero length whose time a longer one has, rows of
-    four zeros, and a few others whose quaternions are no unit quaternions.
+    Left out are rows of zero length whose time a longer one has, rows of four zeros, rows that were interpolated
+    between reports, and a few others whose quaternions are no unit quaternions.
     """
     quaternions = np.column_stack([rows[name] for name in QUATERNION])
     lengths = np.linalg.norm(quaternions, axis=1)
-    absent = lengths == 0
     middles_s = (rows["start_s"] + rows["end_s"]) / 2
     lasting = rows["end_s"] != rows["start_s"]
     repeated = ~lasting & np.isin(middles_s, middles_s[lasting])
-    absent &= ~repeated
-    present = np.flatnonzero(~absent & ~repeated)
-    interpolated = np.zeros(len(lengths), dtype=np.bool_)
-    interpolated[present] = find_interpolated(middles_s[present], quaternions[present])
-    wrong = (np.abs(lengths - 1) > NORM_TOLERANCE) & ~repeated & ~absent & ~interpolated
-    if wrong.sum() > MAX_WRONG_FRACTION * len(wrong):  # the file is wrong, not a few of its rows
-        wrong[:] = False
+    absent = ~repeated & (lengths == 0)
+    kept = ~repeated & ~absent
+    interpolated = np.zeros(len(kept), dtype=np.bool_)
+    interpolated[kept] = find_interpolated(middles_s[kept], quaternions[kept])
+    kept &= ~interpolated
+    wrong = kept & (np.abs(lengths - 1) > NORM_TOLERANCE)
+    wrong &= wrong.sum() <= MAX_WRONG_FRACTION * len(wrong)  # beyond, the file is wrong, not a few of its rows
+    kept &= ~wrong
     omitted = tuple(
         Omitted("rows", int(left_out.sum()), len(left_out), reason, f"row {1 + int(np.argmax(left_out))}")
         for left_out, reason in (
@@ -241,7 +240,7 @@ def select_reports(rows: Mapping[str, Array]) -> tuple[NDArray[np.intp], tuple[O
         )
         if left_out.any()
     )
-    return 1 + np.flatnonzero(~repeated & ~absent & ~interpolated & ~wrong), omitted
+    return {name: column[kept] for name, column in rows.items()}, 1 + np.flatnonzero(kept), omitted
 
 
 def _is_covered(rows_s: Array, time_s: Array) -> NDArray[np.bool_]:

@@ -46,7 +46,7 @@ MAX_STEP_S = 2.0  # from reading to reading: numbers with longer steps are no se
 USUAL_FRACTION = 0.98  # of the steps: the others may be gaps, or stamps with a lost digit
 MAX_LATE_FRACTION = 0.05  # of rows that are written a little later than the next one
 COUNT_NAME = re.compile("packet|count|number|index|seq|frame", re.IGNORECASE)
-UNIT_WORDS = {"ms": "ms", "msec": "ms", "us": "us", "µs": "us", "usec": "us", "ns": "ns", "nsec": "ns", "sec": "s"}
+UNIT_WORDS = {"ms": "ms", "us": "us", "µs": "us", "ns": "ns", "sec": "s"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,13 +110,11 @@ def layout_parts(path: Path, largest_mb: int) -> Iterator[Part]:
         cells = [list(row) for row in zip(*(spell_numbers(column[:count]) for column in columns.values()), strict=True)]
         yield _describe(0, [*columns], [""] * len(columns), cells, [NAN] if _have_nan(columns) else [], rows)
         return
-    skip, heading = _find_beginning(path, largest_mb)
+    skip, groups, heading = _find_beginning(path, largest_mb)
     data = read_rows(path, largest_mb, skip)
-    groups = heading if heading and _names_columns(heading, [*islice(read_rows(path, largest_mb, skip), 1, 3)]) else []
-    if groups:
-        skip, heading = skip + 1, _join_headings(next(data), next(data))
-    elif heading:
+    if heading:
         next(data)
+    heading = _join_headings(groups, heading) if groups else heading
     sampled: list[list[str]] = []
     units, missing, count = [""] * len(heading), set[str](), 0
     for row in data:
@@ -148,9 +146,9 @@ def _names_columns(heading: Sequence[str], below: Sequence[Sequence[str]]) -> bo
 
     The heading of a group is above its first column, so some of its cells are blank.
     """
-    if len(below) < 2 or all(map(str.strip, heading)):
+    if all(heading):
         return False
-    names = [cell.strip() for cell in below[0] if cell.strip()]
+    names = [name for name in below[0] if name]
     units = sum(unit_of(name) is not None for name in names)
     return len(names) >= 2 and 2 * units < len(names) and not any(map(is_value, names)) and any(map(is_value, below[1]))
 
@@ -159,8 +157,8 @@ def _join_headings(groups: Sequence[str], names: Sequence[str]) -> list[str]:
     """Return the heading of each column: its group, stated above the first column, and the column's name or unit."""
     joined: list[str] = []
     group = ""
-    for index, name in enumerate(map(str.strip, names)):
-        group = (groups[index].strip() if index < len(groups) else "") or group
+    for index, name in enumerate(names):
+        group = (groups[index] if index < len(groups) else "") or group
         joined.append(f"{group} [{name}]" if unit_of(name) else f"{group} {name}".strip())
     return joined
 
@@ -185,8 +183,11 @@ def _have_nan(columns: Any) -> bool:
     return any(np.isnan(column).any() for column in columns.values())
 
 
-def _find_beginning(path: Path, largest_mb: int) -> tuple[int, list[str]]:
-    """Return the number of lines to skip, and the heading, which may be empty. Raise Refused `wrong_columns`."""
+def _find_beginning(path: Path, largest_mb: int) -> tuple[int, list[str], list[str]]:
+    """Return the number of lines to skip, the groups' heading above the columns', and this; both may be empty.
+
+    Raise Refused `wrong_columns`.
+    """
     for skip in range(MAX_SKIPPED_LINES):
         rows = [*islice(read_rows(path, largest_mb, skip), 6)]
         if len(rows) < 3:
@@ -197,9 +198,9 @@ def _find_beginning(path: Path, largest_mb: int) -> tuple[int, list[str]]:
             continue
         values = sum(map(is_value, head))
         if values >= 2:
-            return skip, []
+            return skip, [], []
         if sum(map(bool, head)) >= 2:
-            return skip, head
+            return (skip + 1, head, below[0]) if _names_columns(head, below) else (skip, [], head)
     raise Refused(
         "wrong_columns",
         f"{path} has no rows of numbers below a heading in its first {MAX_SKIPPED_LINES} lines",

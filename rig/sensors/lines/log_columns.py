@@ -248,9 +248,11 @@ def _find_wrap(time: Array) -> int | None:
     A counter restarts close below a power of two. A stamp that lost a digit falls as far, but from anywhere.
     """
     time = time[np.isfinite(time)]
+    if len(time) < 2 or time.max() < 100 or time.min() < 0:
+        return None
     steps = np.diff(time)
     falls = steps < -0.5 * np.ptp(time)
-    if not falls.any() or time.max() < 100 or time.min() < 0:
+    if not falls.any():
         return None
     wrap = 2 ** np.ceil(np.log2(time.max() + 1))
     usual = float(np.median(steps[steps >= 0])) if (steps >= 0).any() else 0.0

@@ -79,7 +79,7 @@ def test_what_is_left_out_has_its_reason_and_its_first_row() -> None:
         "end_s": rows_s + 1e-3,
         **dict(zip(("qw", "qx", "qy", "qz"), quaternions.T, strict=True)),
     }
-    numbers, (omitted,) = select_reports(columns)
+    _, numbers, (omitted,) = select_reports(columns)
     assert len(numbers) + omitted.count == omitted.total == len(rows_s) and omitted.count > 0.5 * (~reported).sum()
     assert "interpolated between the attitudes that the reference reported" in str(omitted)
     assert omitted.first == f"row {min(set(range(1, len(rows_s) + 1)) - set(numbers.tolist()))}"
