@@ -85,12 +85,13 @@ def test_real_cameras_tell_the_same_scale_whatever_the_window(window_s: float | 
     ids=WORLDS,
 )
 def test_uncertainties_are_those_of_many_recordings(world: World, thorough: bool) -> None:
+    """The errors of these references do not repeat with the attitude, which U allows for: so u exceeds their RMS."""
     draws = 200 if thorough else 12
     errors = np.array([off(solved(each), each) for each in (follow(world, seed) for seed in range(draws))])
     for each in (errors[:, :3], errors[:, 3:]):
         rms, within = float(np.sqrt(np.mean(each**2))), float(np.mean(np.abs(each) < 2))
         print(f"RMS of error / u {rms:.2f}, {100 * within:.1f} % within U")
-        assert 0.6 < rms < (1.1 if thorough else 1.3)
+        assert 0.5 < rms < (1.1 if thorough else 1.3)
         assert within > (0.93 if thorough else 0.85)
 
 
