@@ -168,7 +168,7 @@ def predict_detection_limits(
     `matrix` (3, 3) is F; `allowance` contains the known errors and the transfers. The bias drifts only by its
     instability (flicker), because no readings show a random walk or scatter.
     """
-    bias = BiasProcess(0.0, 0.0, 0, allowance.instability_rad_s)
+    bias = BiasProcess(instability_rad_s=allowance.instability_rad_s)
     scatter = _build_scatter(segments, allowance.patterns_rad_s, allowance)
     segments_only = _TestedSegments(segments, segments.rates_rad_s @ matrix.T, whiten_segments(segments, scatter, bias))
     return dict(

@@ -81,7 +81,7 @@ def _budget(config: RigConfig, run: PlannedRun, turner: TurnerIdentity, name: st
     inputs = replace(
         inputs, means_rad_s=_simulate_readings(inputs, _mounting_rotation(off_deg) @ mounting), sensor=constant_sensor
     )
-    explained = explain(inputs, mounting, BiasProcess(0.0, 0.0, 0, constant_sensor.instability_rad_s))
+    explained = explain(inputs, mounting, BiasProcess(instability_rad_s=constant_sensor.instability_rad_s))
     uncertainty_inputs = list_uncertainties(environment, name, None)
     # Only a servo's angles are noisy. Its procedure solves by the speeds alone, because hands mount the item inexactly.
     if not noisy_angles:

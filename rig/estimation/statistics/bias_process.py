@@ -32,9 +32,9 @@ class BiasProcess:
     `dof`: the number of contrasts used; `instability_rad_s`: the given Allan deviation of the bias' flicker.
     """
 
-    walk_rad_s_sqrt_s: float
-    scatter_rad_s: float
-    dof: int
+    walk_rad_s_sqrt_s: float = 0.0
+    scatter_rad_s: float = 0.0
+    dof: int = 0
     instability_rad_s: float = 0.0
 
     @property
@@ -187,7 +187,7 @@ def bias_process(
     z, means, variances = (np.asarray(a, dtype=np.float64) for a in (design, means_rad_s, variances_rad2_s2))
     dof = 3 * (len(z) - z.shape[1])
     if dof < 3:
-        return BiasProcess(0.0, 0.0, max(dof, 0), instability_rad_s)
+        return BiasProcess(dof=max(dof, 0), instability_rad_s=instability_rad_s)
     free = np.linalg.qr(z, mode="complete")[0][:, z.shape[1] :].T  # contrasts, free of the parameters
     unit = walk_covariance(windows_s)
     flicker = _flicker(instability_rad_s, windows_s) if instability_rad_s else np.zeros(unit.shape)

@@ -10,6 +10,7 @@ from rig.motion.steps import Dwell, Plan, Rest, Step, Sweep
 from rig.motion.turner_state import Joints
 from rig.plans.motions.six_sweeps import plan_six_observation
 from rig.plans.motions.static_attitudes import dwells
+from rig.plans.motions.temperature_course import NEXT_SET_FRACTION
 from rig.plans.motions.transfer_steps import append_steps, approach, pace_of
 
 MIN_WAIT_S = 1.0
@@ -51,5 +52,5 @@ def _sets(arm: ArmSection, procedure: ThermalSection) -> Iterator[list[Step]]:
 
 def _wait_s(procedure: ThermalSection, steps: list[Step]) -> float:
     """Return the shortest wait before the next set, s: that at the largest permitted rate of the temperature."""
-    gap_s = 60 * procedure.max_step_k / (procedure.max_rate_k_per_min * 2)
+    gap_s = 60 * NEXT_SET_FRACTION * procedure.max_step_k / procedure.max_rate_k_per_min
     return max(MIN_WAIT_S, gap_s - sum(step.duration_s for step in steps))

@@ -104,7 +104,7 @@ def test_a_steady_bias_is_stated_hardly_less_well_than_if_it_were_known_to_be(th
         means = rates + np.sqrt(variances) * rng.standard_normal((12, 3))
         process = bias_process(design_matrix(rates, None), means, variances, windows_s)
         found = solve(means, rates, variances, process, windows_s)
-        best = solve(means, rates, variances, BiasProcess(0.0, 0.0, 24), windows_s)
+        best = solve(means, rates, variances, BiasProcess(dof=24), windows_s)
         std = np.sqrt(np.diag(found.covariance))[3:]
         widths.append(std / np.sqrt(np.diag(best.covariance))[3:])
         errors.append(found.bias_rad_s / std)
