@@ -75,7 +75,7 @@ def solve_by_vector_model(samples: Session, *, with_gravity: bool = False) -> Ar
     sections = [samples[f"gyr_{name}"] for name in (*HOLDS, "x_rot", "y_rot", "z_rot")]
     counts = np.array([len(section) for section in sections])
     begins = np.cumsum(counts) - counts
-    by_axis = np.concatenate(sections).T.copy()  # a sum over contiguous elements is four times as fast
+    by_axis = np.concatenate([section.T for section in sections], axis=1)  # contiguous sums are four times as fast
     means = np.add.reduceat(by_axis, begins, axis=1) / counts
     squares = (by_axis - np.repeat(means, counts, axis=1)) ** 2
     variances = np.add.reduceat(squares, begins, axis=1) / counts**2

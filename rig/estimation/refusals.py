@@ -3,6 +3,7 @@
 `condition_of` computes rank and condition number of a design.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -125,9 +126,9 @@ def check_duplicates(means: Array) -> None:
 
 def check_reads(matrix: Array) -> None:
     """Raise Fault `stuck_sensor` if one row of F (3, 3), an axis, is much less sensitive than the others."""
-    sizes = np.linalg.norm(matrix, axis=1)
-    least = int(np.argmin(sizes))
-    if sizes[least] < STUCK_RATIO * sizes.max():
+    sizes = [math.hypot(*row) for row in matrix.tolist()]
+    least = sizes.index(min(sizes))
+    if sizes[least] < STUCK_RATIO * max(sizes):
         raise Fault(
             "stuck_sensor",
             f"the {'xyz'[least]} axis reads the same however the sensor is moved",
@@ -295,11 +296,11 @@ def condition_of(design: Array, needed: int, noise: float = 0.0) -> Conditioning
     Singular values below rounding errors, or below three times `noise` (the norm of measurement noise in a measured
     design), do not count towards the rank.
     """
-    singular = np.linalg.svd(design, compute_uv=False)
-    floor = max(1e-10 * float(singular[0]), 3 * noise)
-    last = float(singular[needed - 1]) if len(singular) >= needed else 0.0
-    condition = float(singular[0]) / last if last > 0 else float("inf")
-    return Conditioning(int(np.sum(singular > floor)), condition)
+    singular = np.linalg.svd(design, compute_uv=False).tolist()
+    floor = max(1e-10 * singular[0], 3 * noise)
+    last = singular[needed - 1] if len(singular) >= needed else 0.0
+    condition = singular[0] / last if last > 0 else float("inf")
+    return Conditioning(sum(size > floor for size in singular), condition)
 
 
 def check_conditioning(conditioned: Conditioning, needed: int, limit: float, what: str, remedy: str) -> None:
@@ -319,7 +320,7 @@ def warn_of_residuals(residuals: Array, variances: Array, dof: int) -> tuple[str
     """Return a warning if residuals exceed their variances; `dof` is the fit's residual degrees of freedom."""
     if dof <= 0:
         return ()
-    ratio = float(np.sqrt(np.sum(residuals**2 / variances) / dof))
+    ratio = math.sqrt(float(np.sum(residuals**2 / variances)) / dof)
     if ratio < MAX_CONSISTENT_RATIO:
         return ()
     return (f"residuals are {ratio:.1f} times what the variances explain: the readings contain more than noise",)

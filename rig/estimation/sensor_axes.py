@@ -14,7 +14,9 @@ FIRST_AXES, SECOND_AXES = np.array([1, 2, 0]), np.array([2, 0, 1])
 PAIR_INDICES = np.arange(3)
 # The other axis of pair p for axis i, as [p, i]; whether i is the second (1), the first (−1), or not in the pair (0).
 OTHER_AXIS = -(PAIR_INDICES[:, None] + PAIR_INDICES) % 3
-AXIS_ORDER = np.roll(np.eye(3), -1, axis=1) - np.roll(np.eye(3), 1, axis=1)
+IDENTITY = np.eye(3)
+AXIS_ORDER = np.roll(IDENTITY, -1, axis=1) - np.roll(IDENTITY, 1, axis=1)
+IN_PAIR = np.abs(AXIS_ORDER)
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +82,7 @@ def parameter_jacobian(matrix: Array, scale: Array) -> Array:
     """
     jacobian = np.zeros((6, 12))
     jacobian[:3, :9].reshape(3, 3, 3)[PAIR_INDICES, PAIR_INDICES] = -(scale**3)[:, None] * matrix
-    jacobian[3:, 9:] = -np.eye(3)
+    jacobian[3:, 9:] = -IDENTITY
     return jacobian
 
 
@@ -90,11 +92,11 @@ def angle_jacobian(axes: Array, scale: Array, rotation: Array) -> Array:
     A row a_i of the axes A changes by δa_i = k_i (1 − a_i a_iᵀ) δF_i. The mounting R of A = S R changes by
     δR = [δθ]× R, in which (tr S − S) δθ is the axial vector of M − Mᵀ with M = δA Rᵀ.
     """
-    project = scale[:, None, None] * (np.eye(3) - axes[:, :, None] * axes[:, None, :])
+    project = scale[:, None, None] * (IDENTITY - axes[:, :, None] * axes[:, None, :])
     stretch = axes @ rotation.T
     cosines = np.sqrt(1 - (axes @ axes.T)[FIRST_AXES, SECOND_AXES] ** 2)
     # P_i a_j and P_i r_j of the two axes of each pair: pair, row of F, element
-    sines = (axes @ project)[PAIR_INDICES, OTHER_AXIS] * (np.abs(AXIS_ORDER) / cosines[:, None])[..., None]
+    sines = (axes @ project)[PAIR_INDICES, OTHER_AXIS] * (IN_PAIR / cosines[:, None])[..., None]
     axial = (rotation @ project)[PAIR_INDICES, OTHER_AXIS] * AXIS_ORDER[..., None]
-    turns = np.linalg.solve(stretch.trace() * np.eye(3) - stretch, axial.reshape(3, 9))
+    turns = np.linalg.solve(stretch.trace() * IDENTITY - stretch, axial.reshape(3, 9))
     return np.concatenate([sines.reshape(3, 9), turns])

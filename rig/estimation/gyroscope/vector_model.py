@@ -123,14 +123,14 @@ def solve_vector_model(
     speed_std = np.zeros(count) if speed_std_rad_s is None else np.asarray(speed_std_rad_s, dtype=np.float64)
     design = design_matrix(rates, None if gravity_m_s2 is None else np.asarray(gravity_m_s2, dtype=np.float64))
     columns = design.shape[1]
-    conditioning = check_observations(design, means, rates, variances, speed_std)
-    axes_conditioning = condition_of((design / _unit(design))[:, :4], 4) if columns > 4 else conditioning
+    scaled, conditioning = check_observations(design, means, rates, variances, speed_std)
+    axes_conditioning = condition_of(scaled[:, :4], 4) if columns > 4 else conditioning
 
     shared = None if shared_covariance_rad2_s2 is None else np.asarray(shared_covariance_rad2_s2, dtype=np.float64)
     coefficients, inverse, speed_noise = fit_coefficients(
         design, means, rates, variances, speed_std=speed_std, shared=shared
     )
-    raw = _raw_covariance(inverse, variances, speed_noise if speed_std.any() else None, shared)
+    raw = _raw_covariance(inverse, variances, speed_noise, shared)
 
     matrix = coefficients[:3].T
     axes = check_matrix(matrix, None if nominal_mounting is None else np.asarray(nominal_mounting, dtype=np.float64))
@@ -154,13 +154,18 @@ def solve_vector_model(
         observations=count,
         rank=conditioning.rank,
         condition=axes_conditioning.condition,
-        iterations=2 if speed_std.any() else 1,
+        iterations=1 if speed_noise is None else 2,
         warnings=warn_of_residuals(residuals, _all_variances(variances, speed_noise, shared), 3 * (count - columns)),
     )
 
 
-def check_observations(design: Array, means: Array, rates: Array, variances: Array, speed_std: Array) -> Conditioning:
-    """Return the conditioning of the design (N, p). Raise Fault for observations that `solve_vector_model` refuses."""
+def check_observations(
+    design: Array, means: Array, rates: Array, variances: Array, speed_std: Array
+) -> tuple[Array, Conditioning]:
+    """Return the design (N, p) in comparable units, and its conditioning.
+
+    Raise Fault for observations that `solve_vector_model` refuses.
+    """
     count, columns = len(means), design.shape[1]
     for name, array in (("means", means), ("rates", rates), ("variances", variances)):
         require_shape(name, array, (count, 3))
@@ -169,18 +174,23 @@ def check_observations(design: Array, means: Array, rates: Array, variances: Arr
     check_finite(means=means, rates=rates, variances=variances, speed_std=speed_std, design=design)
     check_variances(variances)
     moving = rates.any(axis=1)
-    check_signal(means[moving])
-    check_duplicates(means[moving])
-    return _check_identifiable(design / _unit(design))
+    swept = means[moving]
+    check_signal(swept)
+    check_duplicates(swept)
+    scaled = design / _unit(design)
+    return scaled, _check_identifiable(scaled)
 
 
 def fit_coefficients(
     design: Array, means: Array, rates: Array, variances: Array, *, speed_std: Array, shared: Array | None
-) -> tuple[Array, Array, Array]:
-    """Return coefficients and map as `regress` does, with the errors of speeds in the weights, and these (N, 3)."""
+) -> tuple[Array, Array, Array | None]:
+    """Return coefficients and map as `regress` does, with the errors of speeds in the weights, and these (N, 3).
+
+    If all speeds are exact, they have no errors: None.
+    """
     coefficients, inverse = regress(design, means, variances, shared)
     if not speed_std.any():
-        return coefficients, inverse, np.zeros_like(means)
+        return coefficients, inverse, None
     speed_noise = propagate_speed_std(rates, speed_std, coefficients[:3].T)
     coefficients, inverse = regress(design, means, variances + speed_noise**2, shared)
     return coefficients, inverse, propagate_speed_std(rates, speed_std, coefficients[:3].T)
@@ -271,8 +281,8 @@ def _raw_covariance(inverse: Array, variances: Array, speed_noise: Array | None,
     noise = inverse * variances.T[:, None]
     if shared is not None:
         noise = noise + inverse @ shared
-    axes = np.arange(3)
-    covariance[axes, :, axes] += noise @ np.swapaxes(inverse, -1, -2)
+    blocks_of_axes = np.einsum("ipiq->ipq", covariance)  # a view
+    blocks_of_axes += noise @ np.swapaxes(inverse, -1, -2)
     raw: Array = covariance.reshape(3 * columns, 3 * columns)
     return raw
 
@@ -284,10 +294,11 @@ def index_coefficients(columns: int) -> tuple[NDArray[np.intp], NDArray[np.intp]
     return np.concatenate([index[:, :3].ravel(), index[:, 3]]), index[:, 4:].ravel()
 
 
-def _all_variances(variances: Array, speed_noise: Array, shared: Array | None) -> Array:
+def _all_variances(variances: Array, speed_noise: Array | None, shared: Array | None) -> Array:
     """Return the variances (N, 3) of the means from noise, `speed_noise` (N, 3) and `shared` covariance (N, N)."""
+    of_speed = 0.0 if speed_noise is None else speed_noise**2
     common = 0.0 if shared is None else np.diag(shared)[:, None]
-    total: Array = variances + speed_noise**2 + common
+    total: Array = variances + of_speed + common
     return total
 
 
