@@ -7,19 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from rig.analysis.analyses import calibrate
 from rig.config.column_map import STANDARD_NAMES, TIMES, ColumnMap
 from rig.config.units import UNITS
 from rig.data.quantity import RATE, Quantity
-from rig.data.recording.motion_file import MOTIONS, TIME, Columns, Header, Item
-from rig.data.recording.settings import Site, SolveOptions
+from rig.data.recording.motion_file import MOTIONS, TIME, Columns, Header
 from rig.errors import Refused, RigError
-from rig.estimation.arrays import Array, axis_of
-from rig.estimation.earth import STANDARD_GRAVITY_M_S2
-from rig.observation.by_hand.steadiness import check_at_rest
+from rig.estimation.arrays import Array
 from rig.observation.external.attitude_import import read_attitudes, select_reports
 from rig.observation.external.csv_samples import SAMPLES_MB, Samples, read_sample_table, samples_in
-from rig.observation.external.from_files import Files, build_recording
 from rig.observation.external.omission import Omitted
 from rig.observation.formats.column_selection import MappedColumns, map_motion, map_samples
 from rig.observation.formats.csv_table import read_table
@@ -62,6 +57,11 @@ class LookedFile:
         """The quantities of the file's readings."""
         return () if self.samples is None else tuple(self.samples.readings)
 
+    @property
+    def has_readings(self) -> bool:
+        """True if the file has readings, even if they could not be read yet."""
+        return self.samples is not None or "samples" in self.columns
+
 
 def look_at(path: Path, stated: ColumnMap | None = None) -> LookedFile:
     """Return the contents of a file, according to its headings and numbers or to a `stated` map of its columns.
@@ -88,7 +88,30 @@ def look_at(path: Path, stated: ColumnMap | None = None) -> LookedFile:
     return _read_contents(looked, column_map, has_readings=len(guess.samples) > 1, has_attitudes=len(guess.motion) > 1)
 
 
-def count_from(looked: LookedFile, origin_s: int) -> LookedFile:
+def find_pair(looks: Sequence[LookedFile]) -> tuple[LookedFile | None, LookedFile | None]:
+    """Return the file with the readings, and the one with the attitudes, on the same origin of times; None if none."""
+    log = next((looked for looked in looks if looked.samples is not None), None)
+    reference = _find_reference(looks)
+    return log, reference if log is None or reference is None else _count_from(reference, log.origin_s)
+
+
+def join_maps(looks: Sequence[LookedFile]) -> dict[str, Any]:
+    """Return the map of all files' columns; a log's own attitudes are left out if another file has the attitudes."""
+    reference = _find_reference(looks)
+    columns: dict[str, Any] = {}
+    for looked in reversed(looks):  # if there are two files, the first has the readings
+        is_other = reference is not None and looked.has_readings > reference.has_readings
+        columns |= {key: value for key, value in looked.columns.items() if not (is_other and key.startswith("motion"))}
+    return columns
+
+
+def _find_reference(looks: Sequence[LookedFile]) -> LookedFile | None:
+    """Return the file with the attitudes, preferably one that has no readings; None if no file has attitudes."""
+    with_attitudes = [looked for looked in looks if looked.attitudes is not None]
+    return min(with_attitudes, key=lambda looked: looked.has_readings, default=None)
+
+
+def _count_from(looked: LookedFile, origin_s: int) -> LookedFile:
     """Return a reference's file with its attitudes' times counted from the origin of a log's times."""
     if looked.attitudes is None or not origin_s:
         return looked
@@ -201,60 +224,3 @@ def _read_samples(looked: LookedFile, column_map: ColumnMap) -> LookedFile:
         note=table.note,
         origin_s=table.origin_s,
     )
-
-
-def find_allan_obstacle(samples: Samples) -> RigError | None:
-    """Return the reason why a log does not show a sensor at rest, or None."""
-    try:
-        for quantity, readings in samples.readings.items():
-            check_at_rest(samples.time_s, readings, quantity)
-    except RigError as error:
-        return error
-    return None
-
-
-@dataclass(frozen=True, slots=True)
-class Trial:
-    """An attempt at a solution, for the sensors `only` (all if empty); `obstacle`: why it failed, or None."""
-
-    only: tuple[str, ...] = ()
-    obstacle: str | None = None
-
-
-def try_turns(path: Path, column_map: ColumnMap) -> Trial:
-    """Try to solve a log as one of a sensor turned by hand (`--turns`)."""
-    options = {
-        "clock_ppm": 50.0,
-        "box_rad": float(np.radians(0.2)),
-        "closure": 1.0,
-        "gravity_m_s2": STANDARD_GRAVITY_M_S2,
-    }
-    motion = {name: np.array([value]) for name, value in options.items()}
-    files = Files(path, motion, "turns", Item("imu"), None, column_map)
-    return Trial(obstacle=_find_obstacle(files, SolveOptions(), "+z"))
-
-
-def try_attitudes(
-    path: Path, reference: Path, column_map: ColumnMap, up: str, *, find_clock: bool, sensors: Sequence[str]
-) -> Trial:
-    """Try to solve all sensors of a log in the attitudes of a reference, or else the gyroscope alone."""
-    files = Files(path, reference, "attitudes", Item("imu"), None, column_map)
-    trial = Trial()
-    for only in ((), (RATE.sensor,)) if len(sensors) > 1 and RATE.sensor in sensors else ((),):
-        options = SolveOptions(any_mounting=True, find_clock=find_clock, only=only)
-        trial = Trial(only, _find_obstacle(files, options, up))
-        if trial.obstacle is None:
-            return trial
-    return trial
-
-
-def _find_obstacle(files: Files, request: SolveOptions, up: str) -> str | None:
-    """Return the reason why the files have no solution with `up` upwards, or the checks that fail; None if all pass."""
-    x, y, z = axis_of(up).tolist()
-    site = Site(up=(x, y, z), gravity_m_s2=STANDARD_GRAVITY_M_S2, earth_rate_rad_s=None)
-    try:
-        outcome = calibrate([build_recording(files, site, request)])
-    except RigError as error:
-        return str(error).rstrip(".")
-    failed = [check.name for check in outcome.checks if not check.passed]
-    return f"checks fail: {', '.join(failed)}" if failed else None

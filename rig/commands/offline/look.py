@@ -43,7 +43,7 @@ def run(options: Namespace) -> int:
 
     Return 0. Raise Refused `bad_option`, `no_latest_run`, `configuration_not_written`, and as the files' readers do.
     """
-    from rig.analysis.log_contents import correct_rate_unit, is_incomplete, look_at
+    from rig.analysis.log_contents import correct_rate_unit, is_incomplete, join_maps, look_at
 
     if len(options.files) > 2:
         raise Refused("bad_option", f"{len(options.files)} files are given", "Give a log, or a log and its attitudes")
@@ -56,7 +56,7 @@ def run(options: Namespace) -> int:
     convention = _find_convention(looks)
     if convention is not None and stated is None:
         looks = [correct_rate_unit(looked, convention.ratio) for looked in looks]
-    columns = _join_maps(looks)
+    columns = join_maps(looks)
     _print(looks, convention, columns, stated, options.write or options.columns)
     if options.write is not None:
         _write(options.write, looks, columns)
@@ -91,13 +91,14 @@ def _print(
     named: Path | None,
 ) -> None:
     """Print the files and the commands that can use them. Enter the gyroscope's convention into `columns`."""
+    from rig.analysis.log_contents import find_pair
     from rig.data.quantity import RATE
     from rig.report.terminal.look_lines import describe_convention, describe_file, describe_solutions
 
     for looked in looks:
         for line in describe_file(looked):
             say(line)
-    log, reference = _find_pair(looks)
+    log, reference = find_pair(looks)
     if log is not None and reference is not None and RATE in log.quantities:
         for line in describe_convention(convention, is_order_named=_names_order(reference)):
             say(line)
@@ -112,35 +113,6 @@ def _print(
         say(f"--write {PLACEHOLDER} writes the map of these columns")
 
 
-def _find_pair(looks: "Sequence[LookedFile]") -> "tuple[LookedFile | None, LookedFile | None]":
-    """Return the file with the readings, and the one with the attitudes, on the same origin of times; None if none."""
-    from rig.analysis.log_contents import count_from
-
-    log = next((looked for looked in looks if looked.samples is not None), None)
-    reference = _find_reference(looks)
-    return log, reference if log is None or reference is None else count_from(reference, log.origin_s)
-
-
-def _find_reference(looks: "Sequence[LookedFile]") -> "LookedFile | None":
-    """Return the file with the attitudes, preferably one that has no readings; None if no file has attitudes."""
-    with_attitudes = [looked for looked in looks if looked.attitudes is not None]
-    return min(with_attitudes, key=_has_readings, default=None)
-
-
-def _has_readings(looked: "LookedFile") -> bool:
-    return looked.samples is not None or "samples" in looked.columns
-
-
-def _join_maps(looks: "Sequence[LookedFile]") -> dict[str, Any]:
-    """Return the map of all files' columns; a log's own attitudes are left out if another file has the attitudes."""
-    reference = _find_reference(looks)
-    columns: dict[str, Any] = {}
-    for looked in reversed(looks):  # if there are two files, the first has the readings
-        is_other = reference is not None and _has_readings(looked) > _has_readings(reference)
-        columns |= {key: value for key, value in looked.columns.items() if not (is_other and key.startswith("motion"))}
-    return columns
-
-
 def _names_order(reference: "LookedFile") -> bool:
     """Return whether the file's headings identify the four numbers of the quaternion."""
     from rig.data.recording.motion_file import QUATERNION
@@ -152,8 +124,9 @@ def _names_order(reference: "LookedFile") -> bool:
 def _find_convention(looks: "Sequence[LookedFile]") -> "Convention | None":
     """Return the convention of the attitudes' quaternions, if a gyroscope's readings show it."""
     from rig.analysis.external.convention import find_convention
+    from rig.analysis.log_contents import find_pair
 
-    log, reference = _find_pair(looks)
+    log, reference = find_pair(looks)
     if log is None or log.samples is None or reference is None or reference.attitudes is None:
         return None
     return find_convention(log.samples, reference.attitudes, is_order_named=_names_order(reference))
@@ -167,7 +140,7 @@ def _try_solutions(
     columns: Mapping[str, Any],
 ) -> "TriedSolutions":
     """Return the solutions that the log permits: Allan deviation, turns, attitudes."""
-    from rig.analysis.log_contents import find_allan_obstacle, try_attitudes, try_turns
+    from rig.analysis.log_trials import find_allan_obstacle, try_attitudes, try_turns
     from rig.config.column_map import ColumnMap
     from rig.data.quantity import RATE
     from rig.report.terminal.look_lines import TriedSolutions

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from rig.analysis.external.convention import Convention
-from rig.analysis.log_contents import LookedFile, Trial
+from rig.analysis.log_contents import LookedFile
+from rig.analysis.log_trials import Trial
 from rig.data.quantity import ACCELERATION, RATE
 from rig.errors import RigError
 from rig.errors.quoting import shorten
