@@ -233,6 +233,8 @@ class ArmMotion:
     def _mean_rates(self, time_s: Array, lasting_s: float, standing_rad: Array) -> Array:
         """Return `mean_rates`, with joints at rest at the angles `standing_rad` (k,); NaN stands for a moving joint."""
         moving = np.flatnonzero(np.isnan(standing_rad))
+        if not len(moving):
+            return np.zeros((len(time_s), 3))
         columns = None if len(moving) == len(standing_rad) else moving
         before, middle, after = (
             self.angles(time_s + shift_s, columns=columns) for shift_s in (-lasting_s / 2, 0.0, lasting_s / 2)

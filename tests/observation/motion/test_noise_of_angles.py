@@ -27,3 +27,13 @@ def test_the_noise_of_the_arms_angles_in_a_weighted_mean_rate_is_predicted(rate_
         means.append(weights @ ArmMotion(noisy).rates_at_samples(time_s)[:, 2])
     predicted = ArmMotion(states).state_gain(time_s, weights) * NOISE_RAD * np.sqrt(2) / span_s
     assert np.std(means) / predicted == pytest.approx(1, abs=0.3)
+
+
+def test_an_arm_at_rest_does_not_turn_at_any_sample() -> None:
+    """The noise of its angles is no motion: between two sweeps there may be nothing but noise."""
+    states = synthetic_run(Setup()).states
+    resting = states[states["time_s"] - states["time_s"][0] < 0.9]
+    assert np.ptp(resting["q_rad"], axis=0).max() > 0
+    motion = ArmMotion(states)
+    rates = motion.rates_at_samples(resting["time_s"][0] + 0.1 + np.arange(50) / 100)
+    assert rates.shape == (50, 3) and not rates.any()
