@@ -138,7 +138,7 @@ def test_rows_in_another_order_are_put_in_order() -> None:
     assert [(finding.count, finding.sample) for finding in found.findings] == [(5, 106)]
 
 
-@pytest.mark.parametrize("back_s", [0.05, 1.3])
+@pytest.mark.parametrize("back_s", [0.05, 1.3, 60.0, 3600.0])  # the last two are near the periods of counters
 def test_a_clock_that_was_set_back_is_named_with_row_and_time(back_s: float) -> None:
     stamps_s = np.where(np.arange(COUNT) < 2500, taken(), taken() - back_s)
     with pytest.raises(Refused, match=f"sample 2501: the clock was set back by about {back_s:g} s"):

@@ -32,7 +32,7 @@ from rig.observation.time_stamps.sampling import (
 
 # Periods after which counters restart: 16, 24 and 32 bits of ms and µs; a day and the GPS week.
 WRAPS_S = (*(2.0**bits * unit_s for unit_s in (1e-3, 1e-6) for bits in (16, 24, 32)), 86_400.0, 604_800.0)
-MAX_STEP_FRACTION = 0.25  # of a counter's period: a longer step over its end is no restart
+MAX_RESTART_RATIO = 2.0  # of a step over the end of a counter's period to the longest other step: a longer one is none
 MAX_ZERO_ROWS = 5  # before the first reading
 MAX_REPEAT_FRACTION = 0.01  # of adjacent readings that are equal, for which a repeat is no chance
 MAX_DENSITY = 1.5  # readings per interval, above which two parts of a log overlap; below, rows are in another order
@@ -136,14 +136,18 @@ def _drop_zeros(log: _UnorderedLog) -> _UnorderedLog:
 
 
 def _unwrap(log: _UnorderedLog) -> _UnorderedLog:
-    """Return the log with continuous stamps, if a counter restarted at zero."""
+    """Return the log with continuous stamps, if a counter restarted at zero.
+
+    A clock that was set back by about a counter's period is no restart: then the step over it is unusual.
+    """
     steps_s = np.diff(log.stamps_s)
     backward_steps = np.flatnonzero(steps_s < 0)
     if not len(backward_steps):
         return log
+    longest_s = MAX_RESTART_RATIO * float(steps_s.max())
     for period_s in WRAPS_S:
         over_s = steps_s[backward_steps] + period_s
-        if ((over_s >= 0) & (over_s <= MAX_STEP_FRACTION * period_s)).all() and np.ptp(log.stamps_s) <= period_s:
+        if ((over_s >= 0) & (over_s <= longest_s)).all() and np.ptp(log.stamps_s) <= period_s:
             stamps_s = unwrap_counter(log.stamps_s, period_s)
             reason = f"their counter restarts after {period_s:.10g} s, which are added"
             return log.restamp(stamps_s, stamps_s > log.stamps_s, reason)
@@ -202,12 +206,15 @@ def _check_rising(log: _UnorderedLog, where: str) -> None:
     first = int(backward_steps[0])
     before_s, after_s = log.stamps_s[first : first + 2].tolist()
     back_s = before_s - after_s + float(np.median(np.diff(log.stamps_s)))
-    more = "" if len(backward_steps) == 1 else f", the first of {len(backward_steps)} such steps"
+    more, counter = "", ""
+    if len(backward_steps) > 1:
+        more = f", the first of {len(backward_steps)} such steps"
+        counter = "State with --columns where it begins again (wraps_at), if it is a counter; otherwise give "
     raise Refused(
         "time_not_increasing",
         f"{where} has time_s {after_s:.9g} after {before_s:.9g}, in sample {log.rows[first + 1] + 1}{more}: the clock "
         f"was set back by about {back_s:.4g} s, and nothing shows which of the two is right",
-        "Give the part before it or the part after it, with a motion on the same clock",
+        f"{counter or 'Give '}the part before it or the part after it, with a motion on the same clock",
     )
 
 
