@@ -161,7 +161,7 @@ def _solve_sweeps(
         )
     if reference_c is not None:
         data, polynomials = correct_files(data, reference_c)
-    solution, faults = solve_swept(data, chosen), dict[str, Fault]()
+    solution, faults = _solve_remaining(data, chosen), dict[str, Fault]()
     vector = (
         solution
         if isinstance(solution, VectorSolution | TurnedSolution)
@@ -193,6 +193,16 @@ def _solve_sweeps(
     return ExternalResult(
         read.item, gyroscope, None, {}, {}, by_turns, polynomials=polynomials, omitted=omitted, notes=notes
     )
+
+
+def _solve_remaining(data: ExternalData, estimator: BySweeps | None) -> Estimate:
+    """Return what `solve_swept` returns. If rows were left out, its errors mention them."""
+    try:
+        return solve_swept(data, estimator)
+    except (Fault, Refused) as error:
+        if not (rows := [str(omitted) for omitted in data.omitted if omitted.what == "rows"]):
+            raise
+        raise type(error)(error.name, f"{error.what}; left out: {'; '.join(rows)}", error.remedy) from None
 
 
 def solve_swept(data: ExternalData, estimator: BySweeps | None) -> Estimate:
@@ -246,7 +256,11 @@ def _fewest_of_means(data: ExternalData) -> float:
 
 
 def _vector(data: ExternalData) -> VectorSolution:
-    return solve_vector(data.sweeps, data.rests)
+    try:
+        return solve_vector(data.sweeps, data.rests)
+    except Fault:
+        check_agree(data)  # one wrong row may look like a stuck axis, or like another unit
+        raise
 
 
 def _solve_attitudes(

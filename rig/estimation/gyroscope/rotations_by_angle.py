@@ -30,6 +30,7 @@ from rig.estimation.sensor_axes import SensorAxes, parameter_jacobian
 
 MAX_ITERATIONS, CONVERGED_STEP_RATIO = 20, 1e-3  # step relative to the standard uncertainty
 MAX_END_ERROR_RAD = 0.02  # of an end attitude: beyond, the stated rotation is wrong
+MAX_CONVERGING_RAD = 0.5  # after the first step: beyond, the turns contradict each other, and no solution is near
 MAX_CONDITION = 100.0
 REMEDY = "Turn about three different axes, either way round, or let it lie still once more"
 NOISE, BIAS, ENDS, AXES = "noise", "bias from rest to rest", "ends of the turns", "axes of the turns"
@@ -147,11 +148,13 @@ def solve_turned(
         equations = _equate(gyroscope, turns, means, state)
         if not iterations:
             _conditioning(equations)
+        elif (missed_rad := _find_missed_rad(turns, equations[len(means) :])).max() > MAX_CONVERGING_RAD:
+            raise _not_closed(turns, missed_rad, float(missed_rad.max()))
         step, covariance = _solve(equations)
         state, iterations = state.after_step(step), iterations + 1
         settled = bool((np.abs(step) < CONVERGED_STEP_RATIO * np.sqrt(np.diag(covariance))).all())
     equations = _equate(gyroscope, turns, means, state)
-    ratio, dof = _find_birge_ratio(equations[len(means) :], covariance)  # pyrefly: ignore[unbound-name]  # MAX_ITERATIONS > 0
+    ratio, dof = _find_birge_ratio(turns, equations[len(means) :], covariance)  # pyrefly: ignore[unbound-name]  # MAX_ITERATIONS > 0
     _check_closed(turns, equations[len(means) :], ratio)
     equations = [equation.inflate(ratio) for equation in equations]
     step, covariance = _solve(equations)
@@ -215,6 +218,9 @@ def _equate_rotation(
     lasting_s = turn.end_s - turn.start_s
     stated = np.asarray(Rotation.from_rotvec(turn.axis * turn.angle_rad).as_matrix(), dtype=np.float64)
     missed = Rotation.from_matrix(stated @ rotation.T).as_rotvec()
+    turned_rad = turn.axis @ np.linalg.solve(state.matrix, reading - state.offset) * lasting_s
+    revolutions = np.rint((turn.angle_rad - turned_rad - turn.axis @ missed) / (2 * np.pi))
+    missed = missed + 2 * np.pi * revolutions * turn.axis  # two turns are not one, although they end alike
     rate = turn.axis * turn.angle_rad / lasting_s
     across = _perpendicular_axes(state.matrix @ turn.axis).T  # (2, 3)
     tilt_axes = _perpendicular_axes(turn.axis)  # (3, 2)
@@ -265,32 +271,47 @@ def _conditioning(equations: Sequence[_ObservationEquations]) -> refusals.Condit
     return conditioning
 
 
-def _find_birge_ratio(turns: Sequence[_ObservationEquations], covariance: Array) -> tuple[float, float]:
-    """Return the rotations' Birge ratio and its degrees of freedom; 1 and infinity if χ² is at most its expectation."""
-    chi_square, dof = 0.0, 0.0
-    for turn in turns:
-        weight = np.linalg.inv(turn.covariance)
-        chi_square += float(turn.observed @ weight @ turn.observed)
-        dof += len(turn.observed) - float(np.trace(weight @ turn.design @ covariance @ turn.design.T))
-    if dof <= 1 or chi_square <= dof:
-        return 1.0, np.inf
-    return float(np.sqrt(chi_square / dof)), dof
+def _find_birge_ratio(
+    turns: Sequence[Turn], equations: Sequence[_ObservationEquations], covariance: Array
+) -> tuple[float, float]:
+    """Return the rotations' Birge ratio and its degrees of freedom; 1 and infinity if χ² is at most its expectation.
+
+    The angles about the turns' axes alone determine the scale factors. They are also judged alone, because many other
+    equations that agree would hide one wrong angle, and the larger of the two ratios is returned.
+    """
+    every = np.eye(5)
+    ratios = [(1.0, np.inf)]
+    for rows in ([every] * len(turns), [np.append(turn.axis, [0.0, 0.0])[None] for turn in turns]):
+        chi_square, dof = 0.0, 0.0
+        for judged, equation in zip(rows, equations, strict=True):
+            observed, design = judged @ equation.observed, judged @ equation.design
+            weight = np.linalg.inv(judged @ equation.covariance @ judged.T)
+            chi_square += float(observed @ weight @ observed)
+            dof += len(observed) - float(np.trace(weight @ design @ covariance @ design.T))
+        if dof > 1 and chi_square > dof:
+            ratios.append((float(np.sqrt(chi_square / dof)), dof))
+    return max(ratios)
 
 
 def _check_closed(turns: Sequence[Turn], equations: Sequence[_ObservationEquations], ratio: float) -> None:
     """Raise Fault `turn_not_closed` if rotations contradict their stated angles by more than `MAX_END_ERROR_RAD`."""
     miss_rad = ratio * float(np.median([turn.angle_std_rad for turn in turns]))
-    if miss_rad <= MAX_END_ERROR_RAD:
-        return
-    missed = [
-        float(np.linalg.norm(equation.observed[:3])) * (turn.end_s - turn.start_s)
-        for turn, equation in zip(turns, equations, strict=True)
-    ]
-    worst = int(np.argmax(missed))
-    raise Fault(
+    if miss_rad > MAX_END_ERROR_RAD:
+        raise _not_closed(turns, _find_missed_rad(turns, equations), miss_rad)
+
+
+def _find_missed_rad(turns: Sequence[Turn], equations: Sequence[_ObservationEquations]) -> Array:
+    """Return the angles (k,), rad, by which rotations miss the stated ones."""
+    lasts_s = np.array([turn.end_s - turn.start_s for turn in turns])
+    return np.asarray(np.linalg.norm([equation.observed[:3] for equation in equations], axis=1) * lasts_s)
+
+
+def _not_closed(turns: Sequence[Turn], missed_rad: Array, typical_rad: float) -> Fault:
+    worst = turns[int(np.argmax(missed_rad))]
+    return Fault(
         "turn_not_closed",
-        f"the turns contradict each other by {1e3 * miss_rad:.0f} mrad, most of all the one from "
-        f"{turns[worst].start_s:.1f} to {turns[worst].end_s:.1f} s",
+        f"the turns contradict each other by {1e3 * typical_rad:.0f} mrad, most of all the one from "
+        f"{worst.start_s:.1f} to {worst.end_s:.1f} s",
         "Turn against a stop, so that it ends where it began; check that the rows have the real angles and axes",
     )
 

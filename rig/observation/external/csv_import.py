@@ -54,7 +54,7 @@ AXIS_COLUMNS = ("axis_x", "axis_y", "axis_z")
 STD_COLUMNS = ("angle_std_rad", "axis_std_rad")
 MIN_DURATION_S = 1e-3  # the fewest samples take longer at any data rate
 # Cosine between two axes, and between their readings; least reading relative to a sweep's speed.
-SAME_AXIS_COSINE, OPPOSITE_COSINE, MIN_READING_RATIO = 0.9, -0.5, 0.25
+SAME_AXIS_COSINE, OPPOSITE_COSINE, ACROSS_COSINE, MIN_READING_RATIO = 0.9, -0.5, 0.5, 0.25
 ROUNDING_RATIO = 1e-12  # scatter relative to the mean that is rounding
 QUARTER_DEG = 90.0
 MIN_MOTION = 1e-9  # rad or rad/s: a smaller motion is no sweep, and its square might underflow
@@ -182,8 +182,6 @@ def average(samples: Array, sweeps: Array, axes: Array, temperature_c: Array | N
     rests = []
     for row, (window, speed, gaps) in enumerate(zip(windows, sweeps[:, 2].tolist(), rows, strict=True), start=1):
         within = inside(time_s, window)
-        if not gaps.is_inside:
-            check_complete(gaps.count, gaps.expected, window, f"sweep {row}")
         if not gaps.is_usable:
             continue
         mean = average_bridged(readings[within], sampling.numbers[within], window, gaps.hidden_rad)
@@ -200,13 +198,16 @@ def average(samples: Array, sweeps: Array, axes: Array, temperature_c: Array | N
 
 
 def _list_omitted(rows: Sequence[RowGaps], windows: Sequence[Window]) -> Iterator[Omitted]:
-    """Yield an entry for the rows left out, and one for the readings that are missing in the other rows."""
-    lost = [(number, row) for number, row in enumerate(rows, start=1) if not row.is_usable]
-    if lost:
-        number, row = lost[0]
-        start_s = windows[number - 1].start_s if row.first_s is None else row.first_s
-        reason = "lost_samples: the missing readings may contain a change of the rate"
-        yield Omitted("rows", len(lost), len(rows), reason, f"row {number}, at {start_s:.10g} s")
+    """Yield entries for the rows left out, and one for the readings that are missing in the other rows."""
+    omitted = [(number, row) for number, row in enumerate(rows, start=1) if not row.is_usable]
+    for is_inside, reason in (
+        (False, "not covered by the recording"),
+        (True, "lost_samples: the missing readings may contain a change of the rate"),
+    ):
+        if of_reason := [(number, row) for number, row in omitted if row.is_inside == is_inside]:
+            number, row = of_reason[0]
+            start_s = windows[number - 1].start_s if row.first_s is None else row.first_s
+            yield Omitted("rows", len(of_reason), len(rows), reason, f"row {number}, at {start_s:.10g} s")
     usable = [(number, row) for number, row in enumerate(rows, start=1) if row.is_usable]
     if missing := sum(row.missing for _, row in usable):
         number, row = next((number, row) for number, row in usable if row.missing)
@@ -303,7 +304,16 @@ def _check_directions(turns: Sequence[Observation], rests: Sequence[Average]) ->
     sensed = sizes > MIN_READING_RATIO * np.array([turn.speed_rad_s for turn in turns])
     cosines = axes @ axes.T
     agreement = np.sign(cosines) * (rates @ rates.T) / np.maximum(np.outer(sizes, sizes), np.finfo(float).tiny)
-    contradicting = (np.abs(cosines) > SAME_AXIS_COSINE) & (agreement < OPPOSITE_COSINE) & np.outer(sensed, sensed)
+    alike = (np.abs(cosines) > SAME_AXIS_COSINE) & np.outer(sensed, sensed)
+    contradicting = alike & (agreement < OPPOSITE_COSINE)
+    if rests and (across := np.argwhere(alike & (agreement < ACROSS_COSINE) & ~contradicting)).size:
+        one, other = across[0].tolist()
+        raise Refused(
+            "bad_sweep",
+            f"sweeps {turns[one].sweep} and {turns[other].sweep} state the same axis, but the body turned about "
+            "different ones",
+            "Look at the axes in their rows and in those around them, and at start and end",
+        )
     if contradicting.any():
         worst = int(np.argmax(contradicting.sum(axis=1)))
         others = np.flatnonzero(contradicting[worst])

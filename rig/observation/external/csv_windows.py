@@ -109,8 +109,8 @@ class RowGaps:
 
     @property
     def is_usable(self) -> bool:
-        """Whether enough readings are present to determine the row's mean, and no gap hides too much rotation."""
-        mostly = self.count >= max(MIN_SAMPLES, MIN_READ_FRACTION * self.expected)
+        """Whether enough readings of the whole row are present for its mean, and no gap hides too much rotation."""
+        mostly = self.is_inside and self.count >= max(MIN_SAMPLES, MIN_READ_FRACTION * self.expected)
         return is_complete(self.count, self.expected) or (mostly and bool(np.isfinite(self.hidden_rad)))
 
 

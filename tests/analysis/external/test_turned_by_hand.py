@@ -11,7 +11,7 @@ import pytest
 
 from rig.analysis.external.external_recordings import solve_swept
 from rig.cli import main
-from rig.errors import Fault
+from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.estimate import Estimate
 from support.external.real import recording, unpack
@@ -118,6 +118,27 @@ def test_a_turn_that_was_another_is_named(tmp_path: Path, capsys: pytest.Capture
     named = re.search(r"turn_not_closed: .* from ([\d.]+) to", capsys.readouterr().err)
     assert named is not None
     assert min(abs(float(named[1]) - session.rows[row, 0]) for row in (3, 9)) < 0.5, "it, or its way back"
+
+
+@pytest.mark.parametrize("stated", [2, 0.5, 350 / 360])
+def test_a_turn_that_ends_alike_or_nearly_so_is_another(stated: float, tmp_path: Path) -> None:
+    session = turn(Hand(BOTH_WAYS), 3)
+    session.rows[3, 5] *= stated
+    with pytest.raises(Fault, match="turn_not_closed"):
+        solved(tmp_path, session)
+
+
+def test_one_wrong_angle_of_many_turns_widens_the_uncertainty(tmp_path: Path) -> None:
+    session = turn(Hand(BOTH_WAYS, ends_rad=1e-3, leans_rad=1e-3), 3)
+    session.rows[5, 5] += np.radians(2)
+    assert np.abs(off(solved(tmp_path, session), session)).max() < 2.5
+
+
+def test_exchanged_axes_of_two_turns_are_no_stuck_axis(tmp_path: Path) -> None:
+    session = turn(Hand(BOTH_WAYS), 3)
+    session.rows[[1, 3], 2:5] = session.rows[[3, 1], 2:5]
+    with pytest.raises(Refused, match="bad_sweep: sweeps 2 and 10 state the same axis"):
+        solved(tmp_path, session)
 
 
 @pytest.mark.slow

@@ -48,6 +48,14 @@ def scaled(factor: float, columns: slice) -> Callable[[list[str]], list[str]]:
     return change
 
 
+def test_a_row_that_the_recording_does_not_cover_is_left_out_and_counted(tmp_path: Path) -> None:
+    data = read_with(tmp_path, sweeps=lambda lines: [*lines, "80,86,0,0,1,6.28"])
+    (omitted,) = data.omitted
+    assert str(omitted) == f"1 of {len(data.sweeps) + len(data.rests) + 1} rows, not covered by the recording; the " + (
+        f"first row {omitted.total}, at 80 s"
+    )
+
+
 @pytest.mark.slow
 def test_the_example_is_solved_within_its_uncertainty(capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["solve", str(EXAMPLES / "samples.csv"), "--sweeps", str(EXAMPLES / "sweeps.csv"), "--json"]
@@ -110,7 +118,7 @@ def test_speeds_may_stand_in_place_of_angles(tmp_path: Path) -> None:
         ("not_a_number", list, lambda lines: [lines[0], "1,7,0,0,-1,1e300"]),
         ("not_a_number", lambda lines: [*lines[:100], "1.98,1e200,0,0", *lines[101:]], list),
         ("too_few_observations", list, lambda lines: lines[:1]),
-        ("lost_samples", list, lambda lines: [*lines, "80,86,0,0,1,6.28"]),
+        ("lost_samples", list, lambda lines: [lines[0], lines[1], "80,86,0,0,1,6.28", "90,96,0,0,-1,6.28"]),
         ("wrong_columns", list, lambda lines: []),
         ("wrong_columns", lambda lines: [], list),
         ("no_file", list, lambda lines: [*lines[:2], "1" * 200_000]),
