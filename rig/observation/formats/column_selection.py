@@ -98,9 +98,13 @@ def select_columns(
 ) -> dict[int, str]:
     """Return the rig's name of each column to read, by the column's index in a table of `width` columns.
 
-    Raise Refused `wrong_columns`, `wrong_unit`.
+    A first column without a name holds the row names of R or pandas, and is not read. Raise Refused `wrong_columns`,
+    `wrong_unit`.
     """
-    selected = dict(enumerate(headings)) if mapped is None else _select_mapped(path, headings, width, header, mapped)
+    if mapped is None:
+        selected = {index: name for index, name in enumerate(headings) if name or index}
+    else:
+        selected = _select_mapped(path, headings, width, header, mapped)
     _check_columns(path, [*selected.values()], header)
     return selected
 

@@ -32,7 +32,7 @@ def read_rows(path: Path, largest_mb: int, skipped: int = 0) -> Iterator[list[st
         first = first.lstrip(f"{COMMENT_MARKS} ") or first
         other = next((mark for mark in SEPARATORS if mark in first and (mark in second or "," not in first)), None)
         if other is None and is_divided_by_spaces(second):
-            yield from (line.split() for line in chain([first, second], lines))
+            yield from (split_at_spaces(line) for line in chain([first, second], lines))
             return
         for number, row in enumerate(csv.reader(chain([first, second], lines), delimiter=other or ",")):
             values = [cell.replace(",", ".") for cell in row] if other else row  # decimal commas
@@ -42,8 +42,13 @@ def read_rows(path: Path, largest_mb: int, skipped: int = 0) -> Iterator[list[st
 
 def is_divided_by_spaces(line: str) -> bool:
     """Return whether a line of readings holds values separated by spaces alone."""
-    cells = line.split()
+    cells = split_at_spaces(line)
     return len(cells) > 1 and not any(mark in line for mark in f"{SEPARATORS},") and all(map(is_value, cells))
+
+
+def split_at_spaces(line: str) -> list[str]:
+    """Return the cells of a line that is divided by spaces, without the quotes that R writes around names."""
+    return [cell.strip('"') for cell in line.split()]
 
 
 def is_harmless(path: Path, largest_mb: int) -> bool:

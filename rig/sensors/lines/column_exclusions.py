@@ -80,9 +80,11 @@ def _explain_triad(layout: TableLayout, values: Array, triad: Sequence[int], sen
         return f"the numbers of {' '.join(counters)} rise from row to row, as a counter's"
     if sensor_read:
         return f"they are a second {sensor_read}, and of each kind one is read"
-    if len({np.isfinite(values[:, index]).tobytes() for index in triad}) > 1:
-        return "their numbers are in different rows"
-    return "other columns are named alike"
+    present = np.isfinite(values[:, list(triad)])
+    count = int((present.any(axis=1) & ~present.all(axis=1)).sum())
+    if 0 < 2 * count <= present.any(axis=1).sum():
+        return f"in {count} of {len(present)} rows only some of them have a number"
+    return "their numbers are in different rows" if count else "other columns are named alike"
 
 
 def is_constant(column: Array) -> bool:

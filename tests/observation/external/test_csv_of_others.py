@@ -1,6 +1,7 @@
 """CSV files as loggers and spreadsheets write them: read for what they say, or refused by what is the matter."""
 
 import gzip
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -43,6 +44,8 @@ def read(path: Path, mapped: MappedColumns | None = None) -> np.ndarray:
         lambda text: ("# " + text.replace(",", "   ")).encode(),
         lambda text: b"% " + text.encode(),
         lambda text: text.replace("\n", ",\n").encode(),
+        lambda text: ('""' + re.sub("(?m)^(.)", r'"7",\1', text)[3:]).replace(",", " ").encode(),
+        lambda text: re.sub("(?m)^(.)", r"7,\1", text)[1:].encode(),
         lambda text: text.replace("\n1.0,", "\ntime_s,x_rad_s,y_rad_s,z_rad_s\ns,rad/s,rad/s,rad/s\n1.0,").encode(),
     ],
     ids=[
@@ -54,6 +57,8 @@ def read(path: Path, mapped: MappedColumns | None = None) -> np.ndarray:
         "NumPy's spaces",
         "MATLAB's comment",
         "a separator at the end of every line",
+        "R's row names",
+        "pandas' index",
         "the heading and the units again",
     ],
 )
