@@ -226,10 +226,13 @@ def check_rotations(attitudes: Array) -> None:
 def check_side(reference: Array, side: Array) -> None:
     """Raise Fault `sign_unknown` if a direction (3,) nearly perpendicular to v_ref (3,) leaves its sign unknown."""
     if abs(reference @ side) < MIN_SIDE_COSINE * np.linalg.norm(reference) * np.linalg.norm(side):
+        direction = ", ".join(f"{part:.2f}" for part in (reference / np.linalg.norm(reference)).tolist())
         raise Fault(
             "sign_unknown",
-            "the reference is at right angles to the direction that should show its sign",
-            "Give a direction along which the reference points, for example the vertical for gravity",
+            f"by the readings and the attitudes the reference lies along ({direction}), at right angles to the "
+            "direction that should show its sign",
+            "Give a direction along which the reference points, for example the vertical for gravity; check that the "
+            "attitudes' numbers stand in the order w x y z",
         )
 
 

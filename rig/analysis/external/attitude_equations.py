@@ -39,6 +39,8 @@ class Equations:
     def from_rows(placed: PlacedReadings, *, exact_rates: bool) -> "Equations":
         """Return a gyroscope's equations, with the rates of its reference. Raise Fault `no_rates`."""
         rows = placed.rows
+        if isinstance(rows, Fault):
+            raise rows
         if rows is None or rows.rates_rad_s is None or not exact_rates:
             raise Fault(
                 "no_rates",

@@ -10,12 +10,14 @@ from rig.analysis.external.changes import check_steady
 from rig.analysis.external.inverted import solve_unless_inverted
 from rig.analysis.external.rests_agree import check_rests_agree
 from rig.data.quantity import RATE
+from rig.errors import Fault
 from rig.estimation.arrays import Array, scale_of
 from rig.estimation.external.increment_solution import IncrementSolution, solve_known_increments
 from rig.estimation.gyroscope.budget import Budget
 from rig.estimation.refusals import check_axes, check_unit
 from rig.observation.external.fixes import OmittedIncrements, gather
 from rig.observation.external.omission import Omitted
+from rig.observation.external.reference_clock import check_offset
 from rig.observation.external.reference_rows import Turning, select_covered
 from rig.observation.external.robust_start import find_start
 
@@ -75,9 +77,14 @@ def solve_turning(turning: Turning, window_s: float | None, *, any_mounting: boo
     Raise Fault `inverted_attitudes`, and what `gather`, `solve_known_increments`, `check_steady`, `check_rests_agree`
     and `check_axes` raise.
     """
-    solved = solve_unless_inverted(
-        turning.attitudes, lambda attitudes: _solve(replace(turning, attitudes=attitudes), window_s), CONTRADICTIONS
-    )
+    try:
+        solved = solve_unless_inverted(
+            turning.attitudes, lambda attitudes: _solve(replace(turning, attitudes=attitudes), window_s), CONTRADICTIONS
+        )
+    except Fault as fault:
+        if fault.name in CONTRADICTIONS:
+            check_offset(turning)
+        raise
     if not any_mounting:
         matrix = solved.solution.matrix
         check_axes(matrix / np.linalg.norm(matrix, axis=1, keepdims=True), np.eye(3))

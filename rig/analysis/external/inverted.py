@@ -10,7 +10,7 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 
-from rig.errors import Fault
+from rig.errors import Fault, or_fault
 from rig.estimation.arrays import Array
 from rig.estimation.refusals import report_inverted, report_scalar_last
 
@@ -39,21 +39,21 @@ def solve_unless_inverted(attitudes: Array, solve: Callable[[Array], Solved], co
     except Fault as fault:
         if fault.name not in contradicting:
             raise
-        try:
-            inverted = solve(np.swapaxes(attitudes, -1, -2))
-        except Fault:
-            raise fault from None
-        raise _find_order(attitudes, solve, inverted) from None
+        raise _find_convention(attitudes, solve) or fault from None
 
 
-def _find_order(attitudes: Array, solve: Callable[[Array], Solved], inverted: Solved) -> Fault:
-    """Return the error for reordered or for inverse quaternions, whichever brings the sensor's axes near the body's."""
-    try:
-        reordered = solve(_read_scalar_last(attitudes))
-    except Fault:
-        return report_inverted()
-    aligned, other = (_find_alignment(solved.matrix) for solved in (reordered, inverted))
-    return report_scalar_last() if aligned > other else report_inverted()
+def _find_convention(attitudes: Array, solve: Callable[[Array], Solved]) -> Fault | None:
+    """Return the error for reordered or for inverse quaternions, whichever agree with the readings; None if none do.
+
+    If both agree, the one that brings the sensor's axes near the body's is right.
+    """
+    inverted = or_fault(lambda: solve(np.swapaxes(attitudes, -1, -2)))
+    reordered = or_fault(lambda: solve(_read_scalar_last(attitudes)))
+    if isinstance(reordered, Fault):
+        return None if isinstance(inverted, Fault) else report_inverted()
+    if isinstance(inverted, Fault) or _find_alignment(reordered.matrix) > _find_alignment(inverted.matrix):
+        return report_scalar_last()
+    return report_inverted()
 
 
 def _read_scalar_last(attitudes: Array) -> Array:

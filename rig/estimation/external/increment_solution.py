@@ -57,6 +57,7 @@ OUTLIER_RATIO, MIN_OUTLIER_RAD = 4.0, 1e-3  # an outlier exceeds both: a ratio t
 MAX_OUTLIERS, MAX_OUTLIER_FRACTION, OUTLIER_PASSES = 4, 0.1, 3  # the number or, if more, the fraction
 MAX_ATTITUDE_ERROR_RAD = 0.1  # with larger errors, the attitudes are those of another body
 MAX_CLOCK_STDS = 3.0  # offset if one clock stamps readings and attitudes, in prior standard deviations
+CLOCK_ROUNDING_S = 5e-3  # by which an offset of exactly so much may seem larger
 MAX_IDENTIFIABLE_STD = 0.1  # of an element of F
 MAX_MATRIX_STEP = 10.0  # of F: beyond it, the fit diverges
 MAX_CONDITION = 1e4
@@ -228,8 +229,8 @@ def _check(fixes: Fixes, remaining: Fixes, settled: _ConvergedFit) -> None:
     outliers = np.concatenate(
         [np.flatnonzero(fixes.joined & ~remaining.joined), np.flatnonzero(remaining.joined)[_find_outliers(settled)]]
     )
-    if abs(settled.state.clock_s) > MAX_CLOCK_STDS * CLOCK_STD_S:
-        std_s = float(np.sqrt(settled.solved.covariance[CLOCK, CLOCK]))
+    std_s = float(np.sqrt(settled.solved.covariance[CLOCK, CLOCK]))
+    if abs(settled.state.clock_s) > MAX_CLOCK_STDS * CLOCK_STD_S + max(2 * std_s, CLOCK_ROUNDING_S):
         raise Fault(
             "clocks_apart",
             f"the estimated offset of the attitudes' clock is {1e3 * settled.state.clock_s:+.0f} ± {2e3 * std_s:.0f} "

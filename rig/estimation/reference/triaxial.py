@@ -133,8 +133,6 @@ def solve_triaxial(
         squares = sensed(start, r, v_bar) ** 2 if second_order else None
         conditioning = _conditioning(stack(m, r, squares) / column_sizes(m, squares), m, v, needed)
         refusals.check_conditioning(conditioning, needed, MAX_CONDITION, "some of F, reference and bias", REMEDY)
-        if isinstance(prior, KnownNorm):
-            refusals.check_side(start[REFERENCE], np.asarray(prior.side, dtype=np.float64))
         attitude_error = None
         whiteners = whitening(v)
         if method == "as_published":
@@ -150,6 +148,8 @@ def solve_triaxial(
             _check_attitudes(start, placed, weighted)
             theta, covariance, iterations = weighted.theta, weighted.covariance, weighted.iterations
             attitude_error, whiteners = weighted.attitude_error, weighted.whiteners
+    if isinstance(prior, KnownNorm):  # attitudes that contradict the readings have been refused
+        refusals.check_side(theta[REFERENCE], np.asarray(prior.side, dtype=np.float64))
     f = theta[F].reshape(3, 3)
     _check_scale(scale_of(f), m, prior)
     refusals.check_handedness(f)
@@ -260,7 +260,7 @@ def check_trustworthy(error_rad: float, furthest: Callable[[], tuple[int, float,
     message = f"the readings show that each attitude is off by {1e3 * error_rad:.2g} mrad"
     if error_rad > SUSPICIOUS_ERROR_RAD and enough:
         worst, worst_rad, expected = furthest()
-        if worst_rad > max(MAX_ATTITUDE_ERROR_RAD, OUTLIER_RATIO * expected):
+        if expected <= MAX_ATTITUDE_ERROR_RAD and worst_rad > max(MAX_ATTITUDE_ERROR_RAD, OUTLIER_RATIO * expected):
             error_rad = worst_rad
             by_others = f"but the others by {1e3 * expected:.2g} mrad"
             message = f"attitude {worst + 1} is off by {1e3 * worst_rad:.2g} mrad, {by_others}"

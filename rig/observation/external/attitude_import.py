@@ -42,6 +42,7 @@ from rig.observation.external.placement_account import AttitudeRows
 from rig.observation.external.placements import MIN_STILL_FRACTION, Placements, find_placements
 from rig.observation.external.reference_clock import check_one_clock, find_reference_clock
 from rig.observation.external.reference_rows import Turning
+from rig.observation.external.still_attitudes import find_frozen
 from rig.observation.external.table_motion import check_rates_agree
 from rig.observation.formats.column_selection import MappedColumns
 from rig.observation.formats.csv_table import CsvTable, blank_cell, read_table
@@ -53,6 +54,9 @@ from rig.observation.windows import Window, inside
 RATE_COLUMNS = ("rate_x_rad_s", "rate_y_rad_s", "rate_z_rad_s")
 STD_COLUMN = "attitude_std_rad"
 ATTITUDES_MB = 32  # an hour's table at 50 Hz
+LACKING = "lost_samples: samples are missing in them"
+MOSTLY_LACKING = "lost_samples: half of their samples or more are missing"
+FROZEN = "attitude_untrustworthy: they repeat the attitude before them while the gyroscope turns"
 NORM_TOLERANCE, MAX_WRONG_FRACTION = 1e-3, 0.01  # of a quaternion's length; of the rows that exceed it
 MOMENTS = Header(  # forms of a file: rows with a duration, or with a moment each
     QUATERNION, (TIME, "start_s"), (("start_s", "end_s"), *MOTIONS["attitudes"].optional)
@@ -82,7 +86,8 @@ class Rows:
 class PlacedReadings:
     """Averages of the samples in one file in each attitude that another file states; `quantities` were recorded.
 
-    - `rows`: a gyroscope's averages; `turning`: its readings and all rows, for a solution by rotation angles.
+    - `rows`: a gyroscope's averages, or why there are none; `turning`: its readings and all rows, for a solution by
+      rotation angles.
     - `placements`: the placements of the other sensors, or the Fault that prevents them.
     - `clock`: the table's clock, if it had to be found.
     - `omitted`: rows that the recording does not cover, that repeat a time or are interpolated; `incomplete`: rows that
@@ -90,7 +95,7 @@ class PlacedReadings:
     """
 
     quantities: tuple[Quantity, ...]
-    rows: Rows | None
+    rows: Rows | Fault | None
     turning: Turning | None
     placements: Placements | Fault | None
     clock: TimeBase | None = None
@@ -144,12 +149,14 @@ def average_placements(samples: Samples, table: Mapping[str, Array], *, find_clo
     rates = np.column_stack([table[name] for name in RATE_COLUMNS]) if RATE_COLUMNS[0] in table else None
     windows = _windows(table)
     all_rows = rows_found = _ReferenceRows(windows, _rotations(table), rates, _attitude_std(table), numbers)
-    clock = None
+    clock, rate, frozen = None, readings.get(RATE), tuple[Omitted, ...]()
     if rates is not None:
         check_rates_agree(all_rows.rows_s.mean(axis=1), all_rows.attitudes, rates)
-    if RATE in readings and not find_clock:
+    if rate is not None and not find_clock:
+        all_rows, frozen = _drop_frozen(all_rows, time_s, rate)
+        rows_found = all_rows
         check_one_clock(
-            Turning(time_s, readings[RATE], rows_found.rows_s, rows_found.attitudes, rows_found.std_rad), rates
+            Turning(time_s, rate, rows_found.rows_s, rows_found.attitudes, rows_found.std_rad), rows_found.rates_rad_s
         )
     if find_clock:
         _check_has_rates(readings)
@@ -157,7 +164,8 @@ def average_placements(samples: Samples, table: Mapping[str, Array], *, find_clo
             Turning(time_s, readings[RATE], rows_found.rows_s, rows_found.attitudes, rows_found.std_rad), rates
         )
         time_s = clock.controller_time_s(time_s)
-        rows_found = rows_found.select(np.flatnonzero(_is_covered(rows_found.rows_s, time_s)))
+        all_rows, frozen = _drop_frozen(all_rows, time_s, readings[RATE])
+        rows_found = all_rows.select(np.flatnonzero(_is_covered(all_rows.rows_s, time_s)))
     if not rows_found.windows:
         raise clocks_apart(time_s, windows)
     check_overlap(time_s, rows_found.windows)
@@ -167,26 +175,33 @@ def average_placements(samples: Samples, table: Mapping[str, Array], *, find_clo
     mostly = (counts > 0) & (counts >= MIN_STILL_FRACTION * expected - 1)
     sampled = rows_found.select(np.flatnonzero(mostly))
     covered = rows_found.select(np.flatnonzero(mostly | _is_covered(rows_found.rows_s, time_s)))
-    whole = rows_found.select(_find_complete(rows_found, counts, expected))
-    rate = readings.get(RATE)
+    whole = or_fault(lambda: rows_found.select(_find_complete(rows_found, counts, expected)))
     placement_rows = AttitudeRows(sampled.windows, sampled.attitudes, sampled.numbers, sampled.std_rad)
-    lacking = tuple(_list_omitted(covered, sampled, "lost_samples: half of their samples or more are missing"))
+    lacking = tuple(_list_omitted(covered, sampled, MOSTLY_LACKING))
 
     def find() -> Placements:
+        if not sampled.windows:
+            _find_complete(rows_found, counts, expected)
         placements = find_placements(time_s, readings, placement_rows)
         return replace(placements, omitted=(*lacking, *placements.omitted))
 
     return PlacedReadings(
         tuple(readings),
-        None if rate is None else _rows(time_s, rate, whole),
+        None if rate is None else whole if isinstance(whole, Fault) else _rows(time_s, rate, whole),
         None
         if rate is None
         else Turning(time_s, rate, rows_found.rows_s, rows_found.attitudes, rows_found.std_rad, hides_losses),
         None if set(readings) == {RATE} else or_fault(find),  # a gyroscope needs none
         clock,
-        (*not_reported, *_list_omitted(all_rows, covered, "not covered by the recording")),
-        tuple(_list_omitted(covered, whole, "lost_samples: samples are missing in them")),
+        (*not_reported, *frozen, *_list_omitted(all_rows, covered, "not covered by the recording")),
+        () if isinstance(whole, Fault) else tuple(_list_omitted(covered, whole, LACKING)),
     )
+
+
+def _drop_frozen(rows: "_ReferenceRows", time_s: Array, rate: Array) -> tuple["_ReferenceRows", tuple[Omitted, ...]]:
+    """Return the rows without those of a reference that had stopped, and what is left out."""
+    fresh = rows.select(np.flatnonzero(~find_frozen(rows.rows_s, rows.attitudes, time_s, rate)))
+    return fresh, tuple(_list_omitted(rows, fresh, FROZEN))
 
 
 @dataclass(frozen=True, slots=True)

@@ -117,9 +117,8 @@ class Account:
         left_out, gaps_s, total = (self.rest < 0) & rows, self._find_gaps_s(rows), int(rows.sum())
         if len(lacking := np.flatnonzero(gaps_s > 0)):
             first = int(lacking[0])
-            samples = self._inside(first)
-            at_s = self.time_s[samples[np.argmax(np.diff(self.time_s[samples]))]]
-            where = f"row {self.rows.numbers[first]}, after {at_s:.10g} s"
+            edges_s = self._list_edges_s(first)
+            where = f"row {self.rows.numbers[first]}, after {edges_s[np.argmax(np.diff(edges_s))]:.10g} s"
             reason = f"lost_samples: readings are missing for up to {gaps_s.max():.3g} s, in which the body may move"
             yield Omitted("rows", len(lacking), total, reason, where)
         if len(moving := np.flatnonzero(left_out & (gaps_s == 0))):
@@ -131,9 +130,14 @@ class Account:
         """Return the longest gaps (N,), s, in the `rows` without a rest; 0 for other rows and gaps up to `BLOCK_S`."""
         gaps_s = np.zeros(len(rows))
         for row in np.flatnonzero((self.rest < 0) & rows).tolist():
-            longest_s = float(np.diff(self.time_s[self._inside(row)]).max(initial=0.0))
+            longest_s = float(np.diff(self._list_edges_s(row)).max())
             gaps_s[row] = longest_s if longest_s > BLOCK_S else 0.0
         return gaps_s
+
+    def _list_edges_s(self, row: int) -> Array:
+        """Return the start of a row, the times of its samples, and its end."""
+        window = self.rows.windows[row]
+        return np.array([window.start_s, *self.time_s[self._inside(row)], window.end_s])
 
     def _inside(self, row: int) -> NDArray[np.intp]:
         return np.arange(*inside(self.time_s, self.rows.windows[row]).indices(len(self.time_s)))

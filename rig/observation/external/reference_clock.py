@@ -19,6 +19,7 @@ from rig.observation.clocks.coarse_search import estimate_coarse_offset
 from rig.observation.clocks.time_base import TimeBase
 from rig.observation.external.reference_rows import Turning, select_covered
 from rig.observation.external.robust_start import COARSE_S, find_start
+from rig.observation.external.still_attitudes import MAX_CLOCK_S
 from rig.observation.external.table_motion import TableMotion
 
 MAX_UNEXPLAINED_RATIO = 0.9  # a drift is accepted if it reduces the unexplained fraction to this ratio or less
@@ -27,6 +28,7 @@ CRYSTAL_DRIFT_STD = 1e-4  # between two crystals
 MAX_STEP_INTERVALS, MAX_STEP_DRIFT_FRACTION = 2.5, 0.2
 MIN_DRIFT, MIN_DRIFT_STDS = 5e-4, 6.0  # more than any crystal's, and more than chance
 MAX_UNEXPLAINED = 0.1  # fraction, above which the rows may be inverse rotations
+MIN_AGREEMENT = 0.7  # fraction of the readings' variance that shows another offset of the clocks
 MIN_EXPLAINED = 0.3  # fraction of the readings' variance, by the coarse offset
 
 
@@ -79,6 +81,21 @@ def check_one_clock(turning: Turning, rates_rad_s: Array | None) -> None:
         f"{1e3 * abs(drift) * lasts_s:.0f} ms over the recording: the scale factors would be wrong by as much",
         "Write both files by one clock, or let --estimate-clock-offset find the difference",
     )
+
+
+def check_offset(turning: Turning) -> None:
+    """Raise Fault `clocks_apart` if the rotation of rows and readings agrees after another offset of the clocks."""
+    motion = or_fault(lambda: TableMotion(turning.rows_s.mean(axis=1), turning.attitudes, None))
+    if isinstance(motion, Fault):
+        return
+    explained, offset_s = estimate_coarse_offset(turning.time_s, turning.readings_rad_s, motion)
+    if explained >= MIN_AGREEMENT and abs(offset_s) > MAX_CLOCK_S:
+        raise Fault(
+            "clocks_apart",
+            f"the readings contradict the attitudes, but agree with them if these are {abs(offset_s):.2g} s too "
+            f"{'late' if offset_s > 0 else 'early'}",
+            "Write both files by one clock, or let --estimate-clock-offset find the difference",
+        )
 
 
 def _find_steady_clock(turning: Turning, motion: TableMotion) -> tuple[TimeBase, float]:

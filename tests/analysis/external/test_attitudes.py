@@ -230,7 +230,7 @@ WRONG: dict[str, tuple[str, Change | None, Change | None]] = {
     "a quaternion between q and −q": ("bad_quaternion: .* attitude 7 has", None, interpolated_through_zero),
     "table to body": ("inverted_attitudes", None, times(-1, "qx", "qy", "qz")),
     "quaternions of a mirrored table": ("mirrored_axis", None, times(-1, "qx", "qy")),
-    "scalar last": ("attitude_untrustworthy", None, each(
+    "scalar last": ("inverted_attitudes: .* in the order x y z w", None, each(
         lambda row: {**row, "qw": row["qx"], "qx": row["qy"], "qy": row["qz"], "qz": row["qw"]})),
     "another file of attitudes": ("attitude_untrustworthy", None, of_other_rows),
     "one attitude moved by 2°": ("attitude_untrustworthy: attitude 7 ", None, turned_by_two_degrees),

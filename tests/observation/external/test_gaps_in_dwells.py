@@ -55,6 +55,14 @@ def test_a_gap_in_which_the_body_may_move_is_called_a_gap() -> None:
     )
 
 
+def test_a_recording_that_begins_late_in_a_dwell_is_no_moving_body() -> None:
+    (omitted,) = laid((0.0, 6.0)).omitted
+    assert str(omitted) == (
+        "1 of 4 rows, lost_samples: readings are missing for up to 5.7 s, in which the body may move; the first row "
+        "1, after 0.3 s"
+    )
+
+
 def test_gaps_in_most_dwells_are_refused_as_gaps() -> None:
     with pytest.raises(Fault, match=r"lost_samples: 3 of 4 rows, .* the first row 1, after 3\.98 s"):
         laid((4.0, 6.0), (16.0, 18.0), (28.0, 30.0), turned=(0, 1, 2))
