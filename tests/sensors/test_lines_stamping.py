@@ -78,6 +78,14 @@ def test_by_counting_the_clock_is_the_devices_rate() -> None:
     assert np.array_equal(times_us, numbers * 10_000) and numbers[-1] == 499
 
 
+def test_times_of_arrival_begin_with_the_first_sample() -> None:
+    """However long the computer had been running by then."""
+    section = lines_section(acceleration=None, time=None, columns=("gx", "gy", "gz"), clock="arrival")
+    stamper = Stamper(section, 100.0, "sensors.imu")
+    times_us = [stamper.stamp(np.zeros((10, 3)), 0, 1000 + 0.1 * heap)[2] for heap in range(1, 51)]
+    np.testing.assert_allclose(np.concatenate(times_us), 10_000 * np.arange(500), atol=1)
+
+
 @pytest.mark.slow
 def test_arrival_times_are_made_even() -> None:
     """Bytes come in heaps, 0 to 16 ms late, as from an adapter that collects."""

@@ -10,7 +10,7 @@ import pytest
 
 from rig.cli import main
 from rig.errors import Fault, Refused
-from rig.observation.external.csv_import import ExternalData
+from rig.observation.external.csv_import import ExternalData, average
 from support.external.sweeps_as_files import average_files
 from support.paths import DOCS
 
@@ -68,6 +68,19 @@ def test_the_example_is_solved_within_its_uncertainty(capsys: pytest.CaptureFixt
         errors = np.array(estimate["scale"] + estimate["bias_rad_s"]) - np.concatenate([SCALE, BIAS_RAD_S])
         assert np.all(np.abs(errors) < 3.5 * std)
         assert np.all(std < 1.5e-3)
+
+
+@pytest.mark.parametrize("with_rest", [True, False])
+def test_a_slow_and_a_fast_sweep_the_same_way_round_contradict_each_other_neither_with_a_rest_nor_without(
+    with_rest: bool,
+) -> None:
+    axes = np.array([[0, 0, 1.0], [0, 0, 1.0], [1.0, 0, 0], *([[0, 0, 1.0]] if with_rest else [[0, -1.0, 0]])])
+    speeds = np.array([1.0, 4.0, 1.0, 0.0 if with_rest else 4.0])
+    time_s = np.arange(2000) / 100
+    rates = (speeds[:, None] * axes)[(time_s // 5).astype(int)] + 1e-3 * np.random.default_rng(0).normal(size=(2000, 3))
+    begins_s = 5 * np.arange(4, dtype=np.float64)
+    data = average(np.column_stack([time_s, rates]), np.column_stack([begins_s + 0.3, begins_s + 4.3, speeds]), axes)
+    assert (len(data.sweeps), len(data.rests)) == ((3, 1) if with_rest else (4, 0))
 
 
 def test_the_example_holds_six_turns_and_six_rests() -> None:

@@ -49,6 +49,12 @@ def test_the_freedom_of_a_variance_is_what_its_scatter_shows(
     assert 1 / within < np.median([left.dof for left in found]) / scatter < within
 
 
+def test_readings_that_resemble_their_neighbours_tell_their_noise_from_few_of_them() -> None:
+    """Of a first-order autoregression with coefficient a, 2 / ν = 2 / n + 4 (1 + a) / (1 − a) / n."""
+    drawn = remembering(np.random.default_rng(4), 1428)
+    assert fit_autoregression(drawn, memories=(1,)).dof == pytest.approx(1428 / 9, rel=0.2)
+
+
 def test_a_rest_in_which_the_arm_vibrates_tells_its_noise_from_few_frequencies() -> None:
     rng = np.random.default_rng(2)
     variances = [noise_at_zero(rng.normal(size=(714, 1)))[0] for _ in range(DRAWS)]
