@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from rig.analysis.partial_results import so_far
+from rig.data.recording.recorded_events import BoardNotObserved, BoardRecalled, TimedEvent
 from rig.data.recording.run_data import RunData
 from rig.estimation.gyroscope.vector_model import VectorSolution
 from rig.page.about import About
@@ -15,8 +16,6 @@ from rig.page.replay import Moment, moments
 from rig.page.rows import Look, look_of
 from rig.station.events import ArmSeen, PhaseStarted, Progress, SamplesTaken, StepFinished, StepStarted
 from support.recordings.synthetic_run import Setup, synthetic_run
-
-pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
@@ -34,6 +33,7 @@ def replayed(run: RunData) -> list[Moment]:
     return list(moments(run))
 
 
+@pytest.mark.slow
 def test_steps_come_in_order_and_time_goes_on(replayed: list[Moment]) -> None:
     assert isinstance(replayed[0].event, PhaseStarted)
     assert all(one.at_s <= other.at_s for one, other in pairwise(replayed))
@@ -46,6 +46,7 @@ def test_steps_come_in_order_and_time_goes_on(replayed: list[Moment]) -> None:
     assert progress[-1].remaining_s < 0.2
 
 
+@pytest.mark.slow
 def test_the_arm_and_the_samples_are_those_of_that_moment(run: RunData, replayed: list[Moment]) -> None:
     seen = [moment for moment in replayed if isinstance(moment.event, ArmSeen)]
     for moment in seen[:: len(seen) // 20]:
@@ -58,6 +59,7 @@ def test_the_arm_and_the_samples_are_those_of_that_moment(run: RunData, replayed
     assert last.sensors[0].samples == len(run.samples["gyro"]) and last.sensors[0].lost == 0
 
 
+@pytest.mark.slow
 def test_what_is_shown_at_the_end_is_all_of_it(replayed: list[Moment]) -> None:
     shown = PageState(About("", "", replayed=True, arm={"model": "UR10e or UR12e", "serial_number": "2026"}))
     for moment in replayed:
@@ -70,6 +72,7 @@ def test_what_is_shown_at_the_end_is_all_of_it(replayed: list[Moment]) -> None:
     assert shown.sections["parameters"][0]["scale"][0] == pytest.approx(1.1771, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_value_is_rounded_on_the_screen_alone(run: RunData) -> None:
     """Rounded twice, its last digit there would be another than at the terminal."""
     found = so_far([run])
@@ -77,3 +80,11 @@ def test_a_value_is_rounded_on_the_screen_alone(run: RunData) -> None:
     (parameters,) = look_of(found).parameters
     assert isinstance(solution, VectorSolution)
     assert parameters["scale"] == solution.scale.tolist() and parameters["bias"] == solution.bias_rad_s.tolist()
+
+
+def test_what_the_board_says_is_replayed_at_its_time_by_the_controller_and_not_without_one() -> None:
+    made = synthetic_run(Setup(speed_deg_s=120))
+    said = TimedEvent(BoardNotObserved("gyro", 0, "readings were lost"), 0.0, float(made.states["time_s"][0]) + 0.05)
+    cut = replace(made, states=made.states[:20], events=(said, TimedEvent(BoardRecalled("gyro", 1), 0.0, None)))
+    (shown,) = (moment for moment in moments(cut) if isinstance(moment.event, BoardNotObserved | BoardRecalled))
+    assert shown.event == said.event and shown.at_s == pytest.approx(0.1, abs=0.06)

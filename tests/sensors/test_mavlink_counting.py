@@ -5,12 +5,15 @@ import struct
 import numpy as np
 import pytest
 
+from rig.data.quantity import RATE
 from rig.sensors.errors import SensorError
+from rig.sensors.mavlink.autopilot_source import describe
 from rig.sensors.mavlink.dialect import ARDUPILOT, PX4
 from rig.sensors.mavlink.message_losses import ImuCounter, LinkCounter
 from rig.sensors.mavlink.orientations import RIGHT_ANGLES, board_rotation
 from rig.sensors.mavlink.parameter_encoding import AutopilotParameter, encode_value
 from rig.world.autopilot.autopilot_imu import ORIENTATIONS, orientation_rotation
+from support.wires.autopilot_on_a_wire import section
 
 
 def taken(sequence: list[int], counter: LinkCounter) -> list[int]:
@@ -71,3 +74,12 @@ def test_orientations_are_rotations_and_those_of_the_simulated_autopilot() -> No
     for number in ORIENTATIONS:
         assert board_rotation(float(number)) == pytest.approx(orientation_rotation(number))
     assert board_rotation(1.0) is None and board_rotation(100.0) is None and board_rotation(0.5) is None
+
+
+@pytest.mark.parametrize(("imu", "end_rad_s"), [("SCALED_IMU", 32.767), ("HIGHRES_IMU", np.radians(2000))])
+def test_a_rate_is_clipped_at_the_end_of_its_range_or_of_the_numbers_that_carry_it(imu: str, end_rad_s: float) -> None:
+    """2000 °/s are 34.9 rad/s, and 16 bits of mrad/s end before."""
+    channel = describe("imu", section("/dev/ttyACM0", imu, range_deg_s=2000)).channel(RATE)
+    samples = np.zeros(2, np.dtype([(channel.column, channel.type, 3)]))
+    channel.fill(samples, np.outer([0.97, 1.0], [end_rad_s, 0, 0]))
+    assert channel.is_saturated(samples).tolist() == [False, True]

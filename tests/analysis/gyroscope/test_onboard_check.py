@@ -81,15 +81,16 @@ def test_a_board_that_rounds_to_single_precision_agrees(run: RunData) -> None:
 
 
 @pytest.mark.parametrize(
-    ("factor", "shift_rad_s", "failing"), [(1.0002, 0.0, "gyro.board_scale"), (1.0, 2e-5, "gyro.board_bias")]
+    ("factor", "shift_rad_s", "failing", "unit"),
+    [(1.0002, 0.0, "gyro.board_scale", "1"), (1.0, 2e-5, "gyro.board_bias", "rad/s")],
 )
 def test_a_board_that_computes_wrongly_fails_by_name(
-    run: RunData, factor: float, shift_rad_s: float, failing: str
+    run: RunData, factor: float, shift_rad_s: float, failing: str, unit: str
 ) -> None:
     scale, bias = double_precision(run)
     board = solved(triple(scale * np.array([1, factor, 1])), triple(bias + np.array([0, 0, shift_rad_s])))
     found = check_arithmetic([with_events(run, [*observed(run, range(6)), board])], "gyro")
-    assert [check.name for check in found.checks("gyro") if not check.passed] == [failing]
+    assert [(check.name, check.unit) for check in found.checks("gyro") if not check.passed] == [(failing, unit)]
 
 
 def test_a_board_without_a_solution_is_not_measured_and_fails(run: RunData) -> None:

@@ -124,6 +124,14 @@ def test_no_stretch_at_all_is_refused() -> None:
     assert refused.value.name == "recording_too_short"
 
 
+def test_three_readings_have_a_curve_of_one_point() -> None:
+    readings = white(11, 3)
+    curve = allan_curve([readings], 0.04)
+    assert curve.tau_s.tolist() == [0.04]
+    np.testing.assert_allclose(curve.deviation, np.sqrt(np.mean(np.diff(readings, axis=0) ** 2, axis=0) / 2)[None])
+    assert (curve.low < curve.deviation).all() and (curve.deviation < curve.high).all()
+
+
 def test_what_is_no_white_noise_has_no_random_walk() -> None:
     """A vibration of 1 Hz, or a bias that moves within seconds."""
     shaken = white(8, 15_000) + 3 * np.sin(2 * np.pi * np.arange(15_000) / RATE_HZ / 2)[:, None]

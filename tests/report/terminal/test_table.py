@@ -1,6 +1,7 @@
 """What a person reads: names from outside are shown as they are, and command nothing."""
 
 import io
+import json
 import shutil
 from datetime import UTC, datetime
 from pathlib import Path
@@ -16,7 +17,7 @@ from rig.report.kinds.verification import verification_table
 from rig.report.terminal.board_info import print_stored
 from rig.report.terminal.result_table import print_outcome, print_result
 from support.documents.results import SENSOR, VERIFIED, result_document
-from support.paths import DOCS
+from support.paths import DOCS, RECORDINGS
 
 HOSTILE = "[/nope] [red]x[/] :skull: \x1b[31m\x07"
 SHOWN = "[/nope] [red]x[/] :skull: \\x1b[31m\\x07"
@@ -61,6 +62,14 @@ def test_the_other_tables_show_names_as_they_are(capsys: pytest.CaptureFixture[s
     stored = StoredCalibration(1, "LSM9DS1", 0x68, 245.0, calibration)
     print_stored({"gyro": stored, HOSTILE: None}, as_json=False)
     assert capsys.readouterr().out.count(SHOWN) == 2
+
+
+def test_a_clock_s_offset_is_shown_in_milliseconds_with_twice_its_standard_deviation() -> None:
+    stored = json.loads((RECORDINGS / "swinging/result.json").read_text())
+    increments = stored["gyroscopes"]["imu"]["in_attitudes"]["by_increments"]
+    increments.update(clock_offset_s=2.5e-3, clock_offset_std_s=4.2e-4)
+    text = " ".join(shown(ResultDocument.model_validate_json(json.dumps(stored))).split())
+    assert "the attitudes' clock is +2.50 ± 0.84 ms from the samples'" in text
 
 
 def test_a_path_is_no_markup(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
