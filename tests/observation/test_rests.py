@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rig.data.quantity import RATE
+from rig.data.quantity import ACCELERATION, RATE
 from rig.observation.by_hand.rests import find_rests
 from rig.observation.external.csv_samples import read_samples
 from support.external.real import unpack
@@ -47,3 +47,12 @@ def test_a_gap_ends_a_rest() -> None:
     time_s[500:] += 3.0
     before, after = find_rests(time_s, {RATE: readings})
     assert before.end_s <= 5 and after.start_s >= 8
+
+
+def test_a_knock_ends_no_rest_of_an_accelerometer_in_any_attitude() -> None:
+    time_s = np.arange(1500) / 100
+    readings = 9.81 * np.repeat(np.eye(3), 500, axis=0) + 0.01 * np.random.default_rng(2).normal(size=(1500, 3))
+    for knocked in (250, 750, 1250):
+        readings[knocked : knocked + 2] += 3.0
+    rests = find_rests(time_s, {ACCELERATION: readings})
+    assert [round(rest.start_s) for rest in rests] == [0, 5, 10] and [round(rest.end_s) for rest in rests] == [5, 10, 15]

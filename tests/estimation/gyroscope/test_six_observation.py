@@ -59,6 +59,12 @@ def test_newton_is_exact_for_measured_speeds_whatever_the_bias(size: float) -> N
     assert solution.iterations <= 3
 
 
+def test_newton_is_exact_where_one_way_round_is_faster_than_the_other() -> None:
+    """The mean of the readings, from which they are counted, is then not the bias."""
+    means, speeds = sweeps(speeds=SPEED * np.array([1, 2, 1, 2, 1, 2]))
+    np.testing.assert_allclose(values(gather(means, speeds).solve()), [*SCALE, *BIAS], rtol=1e-9)
+
+
 def test_the_closed_form_is_exact_at_one_speed() -> None:
     bias = np.array([2.0, -1.5, 1.0])  # β0/ω² = 8: sixteen times what Algorithm 1 bears
     means, speeds = sweeps(bias=bias)

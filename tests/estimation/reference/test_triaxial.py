@@ -83,6 +83,17 @@ def test_the_covariance_is_that_of_repeated_calibrations(method: EqualWeights, s
     assert np.all(np.abs(found.mean(axis=0) - THETA) < tolerance * std)
 
 
+@pytest.mark.parametrize(("share", "is_warned"), [(0.45, False), (0.55, True)])
+def test_the_published_estimate_is_warned_of_where_noise_of_all_readings_is_half_of_what_they_read(
+    share: float, is_warned: bool
+) -> None:
+    r, rates = simulate_oscillation(40)
+    exact = readings(r, rates)
+    variances = np.full((1000, 3), share**2 * np.mean(exact**2) / 1000)
+    warnings = solve_triaxial(exact, r, variances, KnownVector(rates), method="as_published").warnings
+    assert any("maximum_likelihood" in warning for warning in warnings) == is_warned
+
+
 @pytest.mark.slow
 def test_noise_in_slow_readings_biases_the_published_estimate_and_only_that() -> None:
     r, rates = simulate_oscillation(40)
