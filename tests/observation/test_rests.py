@@ -55,4 +55,8 @@ def test_a_knock_ends_no_rest_of_an_accelerometer_in_any_attitude() -> None:
     for knocked in (250, 750, 1250):
         readings[knocked : knocked + 2] += 3.0
     rests = find_rests(time_s, {ACCELERATION: readings})
-    assert [round(rest.start_s) for rest in rests] == [0, 5, 10] and [round(rest.end_s) for rest in rests] == [5, 10, 15]
+    assert [round(rest.start_s) for rest in rests] == [0, 5, 10] and [round(rest.end_s) for rest in rests] == [
+        5,
+        10,
+        15,
+    ]

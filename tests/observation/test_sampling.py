@@ -20,6 +20,13 @@ def taken(rate_hz: float, count: int = COUNT) -> np.ndarray:
     return np.arange(count) / rate_hz
 
 
+@pytest.mark.parametrize("count", [20, 50, 110])
+def test_few_readings_at_random_times_have_their_mean_interval(count: int) -> None:
+    stamped_s = np.cumsum(np.random.default_rng(count).exponential(0.01, count))
+    found = find_sampling(stamped_s)
+    assert found.interval_s == pytest.approx(np.diff(stamped_s).mean()) and not found.missing.any()
+
+
 @pytest.mark.parametrize(("rate_hz", "stamps"), ROUNDED + FINE + BURSTS + LATE)
 def test_nothing_is_lost_where_stamps_are_only_bad(rate_hz: float, stamps: Stamps) -> None:
     count = COUNT - COUNT % stamps.burst  # whole packets
