@@ -52,6 +52,13 @@ def test_two_tables_made_apart_say_the_same_of_an_arm(name: ModelName) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
+def test_the_mass_of_a_link_is_no_further_from_its_joint_than_the_link_is_long(name: ModelName) -> None:
+    sizes_m = np.abs(np.array(MODELS[name].nominal)[:, :2])
+    centres_m = np.array(MODELS[name].bodies.centres_m)
+    assert (np.linalg.norm(centres_m, axis=1) <= np.maximum(np.linalg.norm(sizes_m, axis=1), 0.05)).all()
+
+
+@pytest.mark.parametrize("name", NAMES)
 def test_every_row_says_where_its_figures_are_from(name: ModelName) -> None:
     row = load_turner_model(name)
     wanted = {"drawing", "limits", "acceleration", "payload", "room", "state_rate", "home"}

@@ -60,3 +60,12 @@ def test_a_knock_ends_no_rest_of_an_accelerometer_in_any_attitude() -> None:
         10,
         15,
     ]
+
+
+def test_a_short_turn_against_the_bias_is_no_rest_though_it_reads_zero() -> None:
+    time_s = np.arange(1800) / 100
+    readings = 1e-3 * np.random.default_rng(3).normal(size=(1800, 3))
+    readings[:800, 2] += 0.05
+    readings[1000:, 2] += 0.05
+    rests = find_rests(time_s, {RATE: readings})
+    assert [(round(rest.start_s), round(rest.end_s)) for rest in rests] == [(0, 8), (10, 18)]

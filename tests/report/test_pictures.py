@@ -92,7 +92,10 @@ def test_the_picture_of_contributions_is_of_the_values_of_the_budget() -> None:
         for place, x in zip(places, drawn, strict=True):
             decades = np.log10(np.clip(line.std[place] / sensor.budget.std[place], 1e-4, 1.0))
             assert x == pytest.approx(332 + decades * (332 - 150) / 4, abs=0.1)
-    assert picture.end > picture.rows[-1][1] and picture.end - 18 >= 13 * len(picture.rows) - 1
+    heights = np.array([height for _, height, *_ in picture.rows])
+    step = float(heights[1] - heights[0])
+    assert step >= 13
+    np.testing.assert_allclose(heights, picture.end - step * (np.arange(len(heights))[::-1] + 0.5))
 
 
 def test_every_picture_has_words_of_its_own() -> None:

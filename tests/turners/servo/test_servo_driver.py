@@ -95,6 +95,14 @@ def test_a_rest_lasts_as_long_as_it_should_by_the_states_clock() -> None:
         assert 0.3 <= servo.latest.time_s - began_s < 0.5
 
 
+def test_states_come_at_the_rate_that_was_asked_for() -> None:
+    states: list[ServoState] = []
+    with servo_on_a_wire() as wire, control_servo(wire, on_state=states.append, rate_hz=100.0) as servo:
+        states.clear()
+        servo.rest(0.3)
+        assert np.median(np.diff([state.time_s for state in states])) == pytest.approx(0.01, abs=2e-3)
+
+
 def test_a_stop_on_request_holds_the_shaft_where_it_is() -> None:
     with servo_on_a_wire() as wire, control_servo(wire) as servo:
         took_s: list[float] = []

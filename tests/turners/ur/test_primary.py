@@ -16,6 +16,7 @@ from rig.motion.geometry import flange_axes
 from rig.motion.turner_state import JointLimits
 from rig.turners.ur.arm_driver import look
 from rig.turners.ur.arm_report import ArmSetup
+from rig.turners.ur.controller.controller_words import ProgramStopped, decode_message
 from rig.turners.ur.controller.primary_interface import PORT, ArmDescription, read_description
 from support.laboratories.worlds import World
 from support.processes.waiting import PATIENCE_S
@@ -128,3 +129,13 @@ def test_a_look_tells_the_geometry_of_the_simulated_arm(world: World) -> None:
     assert told.kinematics is not None
     np.testing.assert_allclose(flange_axes(np.zeros(6), told.kinematics), flange_axes(np.zeros(6)), atol=1e-12)
     assert told.tcp_offset == (0.0,) * 6
+
+
+@pytest.mark.parametrize(
+    ("title", "decoded"), [(b"PROGRAM_XXX_STOPPED", ProgramStopped("sweep")), (b"PROGRAM_XXX_STARTED", None)]
+)
+def test_the_end_of_a_program_is_decoded_with_its_name_and_its_start_is_not(
+    title: bytes, decoded: ProgramStopped | None
+) -> None:
+    head = struct.pack(">QbB", 0, -1, 7) + struct.pack(">iiB", 0, 0, len(title))
+    assert decode_message(head + title + b"sweep") == decoded
