@@ -141,10 +141,3 @@ def test_other_designs_compare_as_they_should() -> None:
     assert singular == {"tetrahedron", "eight corners", "one direction missing"}  # equal squares, or too few
     known = {name: maximum_prediction_variance(design, "vector") for name, design in list_designs().items()}
     assert known["tetrahedron"] == pytest.approx(4.0) and known["one direction missing"] == pytest.approx(10.0)
-
-
-@pytest.mark.parametrize("name", list_designs())
-def test_the_directions_of_every_design_have_length_one_and_its_rests_none(name: str) -> None:
-    lengths = np.linalg.norm(list_designs()[name], axis=1)
-    np.testing.assert_allclose(lengths, np.round(lengths), atol=1e-15)
-    assert lengths.max() == pytest.approx(1)

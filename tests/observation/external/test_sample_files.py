@@ -78,6 +78,17 @@ def solved(samples: Path, sweeps: Path) -> np.ndarray:
     return np.concatenate([entry.scale, entry.bias_rad_s, np.ravel(entry.covariance)])
 
 
+def test_readings_of_sensors_that_sweeps_do_not_need_may_be_blank(tmp_path: Path) -> None:
+    names, *rows = (EXAMPLES / "samples.csv").read_text().splitlines()
+    fields = ("2e-5,0,4e-5" if row % 4 == 0 else ",," for row in range(len(rows)))
+    samples = tmp_path / "samples.csv"
+    samples.write_text("\n".join([f"{names},x_t,y_t,z_t", *map(",".join, zip(rows, fields, strict=True))]))
+    read = build_recording(
+        Files(samples, EXAMPLES / "sweeps.csv", "sweeps", Item("imu", "any", "1")), STANDARD, SolveOptions()
+    )
+    assert read.external is not None and len(read.external.readings[TIME]) == len(rows)
+
+
 def as_csv(path: Path, table: dict[str, Any]) -> None:
     columns = np.column_stack(list(table.values()))
     np.savetxt(path, columns, "%.9g", delimiter=",", header=",".join(table), comments="")
