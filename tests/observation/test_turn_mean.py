@@ -132,6 +132,14 @@ def test_weights_that_would_amplify_the_noise_of_the_arms_angles_leave_slow_line
         assert np.abs(error(found, weights, made.turn)).max() < 3
 
 
+@pytest.mark.parametrize("cycles", [5.5, 7.4])
+def test_weights_that_hardly_amplify_the_noise_of_the_arms_angles_cancel_a_slow_line(cycles: float) -> None:
+    ripple = Ripple((50, 100), 0.003, unseen_rad_s=2.8e-3, unseen_hz=(cycles * TURN_HZ,), seen_rad_s=0.0, seen_hz=1.0)
+    made = sampled(ripple, 0, noise_rad_s=3e-4, encoder_noise_rad=2.4e-5)
+    _, weights = turn_mean(made.readings, Steps(STEP_RAD_S), made.turn)
+    assert abs(weights @ np.exp(2j * np.pi * cycles * made.turn.fraction)) < 1e-4
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("cycles", [6.4, 6.99, 7.4])
 def test_a_slow_vibration_beside_fast_ones_is_one_line(cycles: float) -> None:
