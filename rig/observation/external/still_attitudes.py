@@ -13,9 +13,7 @@ from rig.observation.windows import Window, inside
 MIN_DWELL_S = 0.5  # shortest row that declares that the body lay still
 MIN_APART_S = 0.5  # between two short rows that show whether it did
 MAX_TIME_ERROR_S = 0.2  # of a row's attitude
-MAX_CLOCK_S = (
-    0.3  # difference of the two clocks: readings as near to the ends of equal attitudes show no motion in them
-)
+MAX_CLOCK_S = 0.3  # difference of two clocks: readings nearer to the ends of equal attitudes show no motion in them
 MAX_STILL_RATE_RAD_S = 0.02  # between them; a camera's errors amount to half of it
 
 
