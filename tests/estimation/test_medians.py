@@ -16,3 +16,8 @@ def test_medians_are_those_of_numpy(shape: tuple[int, ...], axis: int) -> None:
 @pytest.mark.parametrize("values", ([], [2.0], [3, 1, 3, 2, 1], [[1.0, 0.5], [0.5, 2.0]]))
 def test_distinct_values_are_those_of_numpy(values: list[float]) -> None:
     assert distinct(np.array(values)).tolist() == np.unique(values).tolist()
+
+
+def test_nothing_has_no_median() -> None:
+    assert np.isnan(median(np.zeros(0)))
+    assert np.isnan(median(np.zeros((0, 3)), axis=0)).tolist() == [True] * 3
