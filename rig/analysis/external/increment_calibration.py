@@ -8,6 +8,7 @@ import numpy as np
 from rig.analysis.external.attitude_budget import budget_by_causes
 from rig.analysis.external.changes import check_steady
 from rig.analysis.external.inverted import solve_unless_inverted
+from rig.analysis.external.rate_ratios import check_rate_ratios
 from rig.analysis.external.rests_agree import check_rests_agree
 from rig.data.quantity import RATE
 from rig.errors import Fault
@@ -74,8 +75,8 @@ def _spell_time(time_s: float) -> str:
 def solve_turning(turning: Turning, window_s: float | None, *, any_mounting: bool) -> IncrementCalibration:
     """Return the gyroscope's matrix and bias, with windows of a given or an automatically chosen length.
 
-    Raise Fault `inverted_attitudes`, and what `gather`, `solve_known_increments`, `check_steady`, `check_rests_agree`
-    and `check_axes` raise.
+    Raise Fault `inverted_attitudes`, and what `gather`, `solve_known_increments`, `check_rate_ratios`, `check_offset`,
+    `check_steady`, `check_rests_agree` and `check_axes` raise.
     """
     try:
         solved = solve_unless_inverted(
@@ -83,6 +84,7 @@ def solve_turning(turning: Turning, window_s: float | None, *, any_mounting: boo
         )
     except Fault as fault:
         if fault.name in CONTRADICTIONS:
+            check_rate_ratios(turning)
             check_offset(turning)
         raise
     if not any_mounting:
