@@ -11,7 +11,7 @@ from typing import Any, cast
 import numpy as np
 
 from rig.config.column_map import ALLOWED_UNITS
-from rig.config.units import TIME, UNITS
+from rig.config.units import TIME, UNITS, find_unit
 from rig.data.processes.reading_parts import Part
 from rig.data.recording.motion_file import MAX_NUMBER
 from rig.errors import Refused
@@ -213,7 +213,9 @@ def _describe(  # noqa: PLR0917
 ) -> dict[str, Any]:
     """Return the fields of a `TableLayout`: which columns hold numbers, texts and the time."""
     columns = _strip_columns(cells, missing)
-    stated = [unit or unit_in(heading) for heading, unit in zip(headings, units, strict=True)]
+    stated = [
+        _spell_unit(unit) if unit else find_unit_in(heading) for heading, unit in zip(headings, units, strict=True)
+    ]
     numbers = _select_indices(columns, is_number)
     time = _find_time(headings, stated, columns, _select_indices(columns, is_value))
     time_unit = None if time is None or time not in numbers else _time_unit(headings[time], stated[time], columns[time])
@@ -242,14 +244,19 @@ def _select_indices(columns: Sequence[Sequence[str]], accept: Callable[[str], bo
     return [index for index, column in enumerate(columns) if column and all(map(accept, column))]
 
 
-def unit_in(heading: str) -> str:
+def find_unit_in(heading: str) -> str:
     """Return the unit that a heading states in brackets or at its end, as `UNITS` spells it, or ""."""
     if (match := BRACKETED_UNIT.search(heading)) is not None:
-        text = re.sub(r"\s*(s)\^?-(\d)", lambda power: f"/s{power[2] if power[2] != '1' else ''}", match[1])
-        return next((name for name in (text, text.replace("^", "")) if name in UNITS), "")
+        return _spell_unit(match[1])
     if (match := UNDERSCORED_UNIT.search(heading)) is not None:
         return SPELLED_UNITS.get(match[1].lower(), match[1].lower())
     return ""
+
+
+def _spell_unit(stated: str) -> str:
+    """Return a unit as `UNITS` spells it, or "" if it is unknown."""
+    text = re.sub(r"\s*(s)\^?-(\d)", lambda power: f"/s{power[2] if power[2] != '1' else ''}", stated)
+    return find_unit(f"{text}/s" if text.casefold() == "mdeg" else text)  # some loggers leave out the second
 
 
 def _largest_number(column: Sequence[str]) -> float:

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Sequence
 
-from rig.config.units import UNITS, find_unit
+from rig.config.units import UNITS
 from rig.observation.formats.table_layout import TableLayout
 from rig.sensors.lines.guessing import match_names
 
@@ -19,12 +19,8 @@ def state_unit(layout: TableLayout, index: int) -> str:
 
     G after an accelerometer's name is that of gravity, not gauss.
     """
-    unit, heading = layout.units[index], layout.headings[index]
-    if unit in UNITS:
-        return unit.lower() if unit in ("G", "mG") and "acc" in heading.lower() else unit
-    bracketed = re.search(r"[\[(]([^\])]+)[\])]\s*$", heading)
-    text = bracketed[1] if bracketed else unit
-    return find_unit(f"{text}/s" if text.casefold() == "mdeg" else text)  # some loggers leave out the second
+    unit = layout.units[index]
+    return unit.lower() if unit in {"G", "mG"} and "acc" in layout.headings[index].lower() else unit
 
 
 def simplify_heading(layout: TableLayout, index: int) -> str:
