@@ -11,6 +11,14 @@ REPEATED = "repeated"
 AXES = ("x", "y", "z")
 TEMPERATURE_WORDS = {"temp", "temperature"}
 BRACKETED_CELSIUS = re.compile(r"[\[(]\s*(°|deg ?)?C\s*[\])]")
+LABEL = r"[a-z]?|(c|col|column|v|var|ch|channel|d|data|value|field|unnamed|x)_?\d+"
+UNIT_WORDS = {"rad", "s", "deg", "dps", "mdps", "m", "s2", "g", "mg", "t", "ut"}
+SHORT_NAMES = {"g", "gyr", "gyro", "w", "r", "a", "acc", "accel", "f", "m", "mag", "b", "h"}
+OTHER_WORDS = re.compile(r"angle|angular_?acc|accuracy|magnitude|bias|offset|std|sigma|covar|error|jerk")
+KIND_BY_WORD = re.compile(
+    r"(?<![^_])(?:(?P<gyro>g|w|omega|(?:gyr|ang|rot)[^_]*)|(?P<acc>a|(?:acc|lin)[^_]*)|(?P<mag>mag[^_]*))(?![^_])"
+)
+KIND_BY_PART = re.compile(r"(?P<gyro>gyr)|(?P<acc>acc)|(?P<mag>mag)")  # SENSgyro
 KIND_OF = {UNITS["rad/s"].quantity: "gyro", UNITS["m/s2"].quantity: "acc", UNITS["T"].quantity: "mag"}
 
 
@@ -53,9 +61,8 @@ def _find_kind(words: Sequence[str], unit: str) -> str:
         return ""
     if unit in UNITS and UNITS[unit].quantity in KIND_OF:  # x [°/s]
         return KIND_OF[UNITS[unit].quantity]
-    kinds = [KINDS.get(word, KINDS.get(word[:3], "")) for word in words] if len(words) > 1 else []
-    kinds += [kind for part, kind in SENSOR_PARTS.items() if part in text]  # SENSgyro
-    return next(filter(None, kinds), "")
+    match = (KIND_BY_WORD.search(text) if len(words) > 1 else None) or KIND_BY_PART.search(text)
+    return "" if match is None else str(match.lastgroup)
 
 
 def _divide_axis(words: list[str]) -> list[str]:
@@ -63,23 +70,6 @@ def _divide_axis(words: list[str]) -> list[str]:
     match = re.fullmatch(r"(.+)([xyz])", words[0]) if words else None
     is_short = match is not None and match[1] in SHORT_NAMES and UNIT_WORDS.issuperset(words[1:])
     return [match[1], match[2], *words[1:]] if match is not None and is_short else words
-
-
-OTHER_WORDS = re.compile(r"angle|angular_?acc|accuracy|magnitude|bias|offset|std|sigma|covar|error|jerk")
-SHORT_NAMES = {"g", "gyr", "gyro", "w", "r", "a", "acc", "accel", "f", "m", "mag", "b", "h"}
-SENSOR_PARTS = {"gyr": "gyro", "acc": "acc", "mag": "mag"}
-KINDS = {
-    "g": "gyro",
-    "gyr": "gyro",
-    "ang": "gyro",
-    "omega": "gyro",
-    "w": "gyro",
-    "rot": "gyro",
-    "acc": "acc",
-    "lin": "acc",
-    "a": "acc",
-    "mag": "mag",
-}
 
 
 def _strip_units(words: list[str]) -> list[str]:
@@ -92,10 +82,6 @@ def _strip_units(words: list[str]) -> list[str]:
         before = words[: axes[-1]] or ([kind] if kind else [])
         return [*before, words[axes[-1]]]
     return words
-
-
-LABEL = r"[a-z]?|(c|col|column|v|var|ch|channel|d|data|value|field|unnamed|x)_?\d+"
-UNIT_WORDS = {"rad", "s", "deg", "dps", "mdps", "m", "s2", "g", "mg", "t", "ut"}
 
 
 def order_axes(indices: Sequence[int], names: Sequence[str]) -> list[int]:
