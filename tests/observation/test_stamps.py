@@ -64,6 +64,13 @@ def test_bad_stamps_lose_nothing_and_rise(rate_hz: float, stamp: Callable[[Array
     assert (np.diff(found.time_s) > 0).all() and off_s(found, time_s) < nearest_s
 
 
+@pytest.mark.parametrize("rate_hz", [60.0, 200.0])
+def test_stamps_in_whole_seconds_are_used(rate_hz: float) -> None:
+    found = ordered(np.floor(taken(rate_hz)))
+    assert found.sampling.interval_s == pytest.approx(1 / (1.0007 * rate_hz), rel=0.2)
+    assert found.sampling.scattered < 0.01 and (np.diff(found.time_s) > 0).all()
+
+
 @pytest.mark.parametrize("lost", [0.005, 0.02, 0.04])
 def test_losses_are_counted_behind_the_rounding(lost: float) -> None:
     stamped_s, kept = Stamps(rounded_s=1e-3, lost=lost).stamp(taken())
@@ -128,6 +135,17 @@ def test_a_second_reading_of_one_stamp_needs_a_time_of_its_own() -> None:
     found = ordered(late)
     assert [(finding.count, finding.left_out) for finding in found.findings] == [(1, False)]
     assert not found.sampling.missing.any() and off_s(found, time_s) < 1e-4
+
+
+@pytest.mark.parametrize("lasts", [12, 700])
+def test_readings_that_a_stopped_link_repeats_are_no_readings(lasts: int) -> None:
+    values = readings() + 500 * np.sin(taken())[:, None]  # a moving body: the readings jump when the link goes on
+    values[900 : 900 + lasts] = values[900]
+    found = order_stamps(taken(), values)
+    assert [(finding.count, finding.sample, finding.left_out) for finding in found.findings] == [(lasts - 1, 902, True)]
+    assert found.sampling.missing.sum() == lasts - 1
+    coarse = np.rint(values / 200)
+    assert not order_stamps(taken(), coarse).findings, "there readings repeat anyway"
 
 
 def test_rows_in_another_order_are_put_in_order() -> None:

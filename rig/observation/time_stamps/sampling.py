@@ -185,8 +185,12 @@ def _exceeds_rounding(time_s: Array, sampling: Sampling, resolution_s: float) ->
 
 
 def find_typical_interval_s(time_s: Array) -> float:
-    """Return the typical interval between readings at increasing times (n ≥ 2,); some may be missing or late."""
-    return min(_interval_quantile(time_s, apart) for apart in LONG_WIDTHS)
+    """Return the typical interval between readings at increasing times (n ≥ 2,); some may be missing or late.
+
+    If most stamps are equal, it is the mean interval.
+    """
+    intervals_s = [_interval_quantile(time_s, apart) for apart in (*LONG_WIDTHS, len(time_s) - 1)]
+    return min((interval_s for interval_s in intervals_s[:-1] if interval_s > 0), default=intervals_s[-1])
 
 
 def _count_missing(time_s: Array, width: int, quantile: float) -> _PeriodCandidate:
@@ -258,6 +262,7 @@ def _estimate_unlocated_losses(time_s: Array) -> Sampling:
     lost = width >= MAX_BURST and WALK_GROWTH[0] * near < far < WALK_GROWTH[1] * near
     nowhere = np.zeros(len(time_s) - 1, dtype=np.intp)
     scattered = far / (apart * mean_s**2) if lost else 0.0
+    scattered = 0.0 if scattered >= 1 else scattered  # more than all: the stamps show nothing
     usual_s = find_typical_interval_s(time_s)
     late_s = time_s - usual_s * np.arange(len(time_s))
     late = late_s - find_least_ahead(late_s, LONG_WIDTHS[0]) > LONG_STEP_INTERVALS * usual_s

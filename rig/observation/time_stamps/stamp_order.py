@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.errors import Refused
-from rig.estimation.arrays import Array, unwrap_counter
+from rig.estimation.arrays import Array, equal_runs, unwrap_counter
 from rig.observation.time_stamps.even_times import find_sampling_times
 from rig.observation.time_stamps.moving_values import find_least_ahead
 from rig.observation.time_stamps.sampling import (
@@ -35,6 +35,7 @@ WRAPS_S = (*(2.0**bits * unit_s for unit_s in (1e-3, 1e-6) for bits in (16, 24, 
 MAX_RESTART_RATIO = 2.0  # of a step over the end of a counter's period to the longest other step: a longer one is none
 MAX_ZERO_ROWS = 5  # before the first reading
 MAX_REPEAT_FRACTION = 0.01  # of adjacent readings that are equal, for which a repeat is no chance
+MIN_HELD, MIN_JUMP_RATIO = 4, 5.0  # equal readings in a row, and the step after them in median steps, of a stop
 MAX_DENSITY = 1.5  # readings per interval, above which two parts of a log overlap; below, rows are in another order
 MAX_DISORDER_S = 1.0  # by which a row is out of order; beyond, a clock was set back
 MIN_STALE_DELAY_S, MAX_STALE_STEP = 0.1, 0.8  # of a stale reading; step of stale readings, in intervals
@@ -109,7 +110,7 @@ def order_stamps(stamps_s: Array, readings: Array, where: str = "the samples") -
     Raise Refused `time_not_increasing`, which names `where`, if a clock was set back.
     """
     log = _UnorderedLog(np.arange(len(stamps_s)), stamps_s, readings)
-    for step in (_drop_empty, _drop_zeros, _unwrap, _drop_repeated, _sort):
+    for step in (_drop_empty, _drop_zeros, _unwrap, _drop_repeated, _sort, _drop_held):
         log = step(log)
     _check_rising(log, where)
     if len(log.rows) > 2:
@@ -196,6 +197,29 @@ def _sort(log: _UnorderedLog) -> _UnorderedLog:
             return log
     ordered = _UnorderedLog(log.rows[order], stamps_s, log.readings[order], log.findings)
     return ordered.restamp(stamps_s, early[order], "they stand after later ones, and are put in order")
+
+
+def _drop_held(log: _UnorderedLog) -> _UnorderedLog:
+    """Return the log without rows that repeat the readings before them for long, and then jump to other ones.
+
+    A sensor or a link that stops repeats its last reading, as a body at rest does in a coarse log; but where readings
+    rarely repeat otherwise, a long repetition is no chance. At its end the readings jump, if the body moved.
+    """
+    steps = np.diff(log.readings, axis=0)
+    same = (steps == 0).all(axis=1)
+    runs = equal_runs(np.cumsum(np.append(False, ~same))[: len(log.readings)])
+    runs = runs[runs[:, 1] - runs[:, 0] >= MIN_HELD]
+    runs = runs[runs[:, 1] < len(log.readings)]
+    if not len(runs):
+        return log
+    usual = np.median(np.abs(steps[~same]), axis=0)
+    stopped = np.zeros(len(log.readings), dtype=np.bool_)
+    for start, end in runs.tolist():
+        stopped[start + 1 : end] = bool((np.abs(steps[end - 1]) > MIN_JUMP_RATIO * usual).any())
+    others = same[~stopped[1:]]
+    if not len(others) or others.mean() > MAX_REPEAT_FRACTION:
+        return log
+    return log.select(~stopped, "they repeat the reading before them: the sensor or its link had stopped")
 
 
 def _check_rising(log: _UnorderedLog, where: str) -> None:
