@@ -9,6 +9,7 @@ Loggers of several sensors leave cells blank in rows of another sensor. Such row
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -26,11 +27,12 @@ from rig.observation.false_readings import check_possible, check_temperatures, c
 from rig.observation.formats.column_selection import MappedColumns
 from rig.observation.formats.csv_table import CsvTable, blank_cell, read_table
 from rig.observation.formats.sample_files import readings_in
-from rig.observation.statistics.spikes import bridge_spikes, find_spikes
+from rig.observation.statistics.spikes import bridge_spikes, find_markers, find_spikes
 from rig.observation.time_stamps.sampling import Sampling
 from rig.observation.time_stamps.stamp_order import OrderedStamps, order_stamps
 
 SAMPLES_MB = 256  # enough for an hour at 1 kHz
+MARKERS = "markers of a missing value: one number again and again, which the readings around it do not approach"
 SPIKES = "spikes: each is far from the readings before and after it, which no rotation explains"
 
 
@@ -205,10 +207,11 @@ def samples_in(table: Columns, where: str) -> Samples:
         for finding in ordered.findings
         if finding.left_out
     ]
-    if RATE in readings and len(spikes := find_spikes(ordered.time_s, readings[RATE])):
-        first = f"sample {rows[spikes[0]] + 1}, at {ordered.time_s[spikes[0]]:.10g} s"
-        omitted.append(Omitted("gyroscope readings", len(spikes), len(rows), SPIKES, first))
-        readings[RATE] = bridge_spikes(ordered.time_s, readings[RATE], spikes)
+    for find, reason in ((find_markers, MARKERS), (partial(find_spikes, ordered.time_s), SPIKES)):
+        if RATE in readings and len(wrong := find(readings[RATE])):
+            first = f"sample {rows[wrong[0]] + 1}, at {ordered.time_s[wrong[0]]:.10g} s"
+            omitted.append(Omitted("gyroscope readings", len(wrong), len(rows), reason, first))
+            readings[RATE] = bridge_spikes(ordered.time_s, readings[RATE], wrong)
     return Samples(
         ordered.time_s,
         readings,

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from rig.errors import Fault, Refused
 from rig.estimation.arrays import Array
+from rig.estimation.statistics.rounding import Steps, bound_rounding_variance, find_steps
 from rig.observation.average import Average
 from rig.observation.statistics.coloured_noise import correlation_inflation, fit_autoregression
 from rig.observation.time_stamps.gaps import hidden_angles_rad
@@ -17,6 +18,7 @@ from rig.observation.windows import Window, inside
 
 MIN_SAMPLES = 20
 MAX_LOST_FRACTION = 0.01
+FEW_VALUES = 6  # different ones of an axis, whose least difference is a step
 MIN_READ_FRACTION = 0.5  # of a row's readings: fewer do not determine its mean
 
 
@@ -52,13 +54,18 @@ def find_overlap(windows: Sequence[Window]) -> tuple[int, int] | None:
 def scatter_of(readings: Array) -> tuple[Array, Array, Array]:
     """Return three arrays (3,): variance of the mean of readings (n, 3), its degrees of freedom, one reading's std.
 
-    A vibration counts as noise, because no arm's encoders show which part of the scatter it is.
+    A vibration counts as noise, because no arm's encoders show which part of the scatter it is. The variance includes
+    the rounding to steps that are coarse for the noise.
     """
     variance = readings.var(axis=0, ddof=1)
     residuals = (readings - readings.mean(axis=0)).T
     inflation = np.array([correlation_inflation(axis) for axis in residuals])
     dof = np.array([fit_autoregression(axis).dof for axis in residuals])
-    return variance * inflation / len(readings), dof, np.sqrt(variance)
+    values = [np.unique(axis) for axis in readings.T]
+    few = [np.diff(axis).min() if 1 < len(axis) <= FEW_VALUES else 0.0 for axis in values]
+    steps = Steps(np.where(few, few, find_steps(readings)))
+    rounding = bound_rounding_variance(readings, steps, np.zeros_like(readings), variance)
+    return variance * inflation / len(readings) + rounding, dof, np.sqrt(variance)
 
 
 def average_of(readings: Array, window: Window) -> Average:

@@ -22,6 +22,10 @@ SIDE_READINGS, SPIKE_READINGS = 10, 5
 # deviation of a spike's neighbours from their cubics, relative to the spike's own; its tolerance
 NEIGHBOUR_RATIO, NEIGHBOUR_TOLERANCE = -2 / 3, 0.2
 PASSES = 3  # spikes that are close together hide each other
+# Readings of one value that are markers; their ratio to the readings of each of the nearest values, so many on either
+# side, and to those of this quantile of all values; least fraction of them that the readings before differ from.
+MIN_MARKERS, MIN_MARKER_RATIO, NEAREST, USUAL_QUANTILE, MIN_ALONE = 5, 5.0, 2, 0.9, 0.5
+SHIFTS = [shift for shift in range(2 * NEAREST + 1) if shift != NEAREST]
 
 
 def find_spikes(time_s: Array, rates: Array) -> NDArray[np.intp]:
@@ -38,6 +42,25 @@ def find_spikes(time_s: Array, rates: Array) -> NDArray[np.intp]:
         spikes = np.union1d(spikes, more)
         bridged = bridge_spikes(time_s, rates, spikes)
     return spikes
+
+
+def find_markers(rates: Array) -> NDArray[np.intp]:
+    """Return the indices (k,) of rates (n, 3) that repeat one value of an axis far more often than those near it.
+
+    So does a logger that writes 0 for a missing value. A sensor with coarse steps repeats its values evenly, and one
+    that is stuck, or at the end of its range, repeats them one after the other.
+    """
+    marked = np.zeros(len(rates), dtype=np.bool_)
+    for axis in rates.T:
+        values, index, counts = np.unique(axis, return_inverse=True, return_counts=True)
+        starts = np.append(True, axis[1:] != axis[:-1])[: len(axis)]  # of runs of equal readings
+        alone = np.bincount(index[starts], minlength=len(values))
+        padded = np.pad(counts, NEAREST)
+        usual = float(np.quantile(counts, USUAL_QUANTILE)) if len(counts) else 1.0
+        near = np.max([padded[shift : shift + len(values)] for shift in SHIFTS], axis=0, initial=usual)
+        is_marker = (counts >= np.maximum(MIN_MARKERS, MIN_MARKER_RATIO * near)) & (alone >= MIN_ALONE * counts)
+        marked |= is_marker[index]
+    return np.flatnonzero(marked)
 
 
 def bridge_spikes(time_s: Array, rates: Array, spikes: NDArray[np.intp]) -> Array:

@@ -11,6 +11,7 @@ import pytest
 from rig.cli import main
 from rig.errors import Fault, Refused
 from rig.observation.external.csv_import import ExternalData, average
+from rig.observation.external.csv_windows import scatter_of
 from support.external.sweeps_as_files import average_files
 from support.paths import DOCS
 
@@ -46,6 +47,15 @@ def scaled(factor: float, columns: slice) -> Callable[[list[str]], list[str]]:
         return changed
 
     return change
+
+
+def test_a_means_variance_holds_the_rounding_to_coarse_steps() -> None:
+    rng, true = np.random.default_rng(1), np.linspace(0, 1, 41)
+    rounded = np.rint(true[:, None, None] + 0.25 * rng.normal(size=(41, 400, 3)))
+    errors = [
+        (rows.mean(axis=0) - level) / np.sqrt(scatter_of(rows)[0]) for rows, level in zip(rounded, true, strict=True)
+    ]
+    assert 0.3 < np.sqrt(np.mean(np.square(errors))) < 1.3 and np.abs(errors).max() < 2.8
 
 
 def test_a_row_that_the_recording_does_not_cover_is_left_out_and_counted(tmp_path: Path) -> None:

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from rig.errors import Fault
-from rig.observation.external.reference_clock import check_offset
+from rig.observation.external.reference_clock import check_offset, check_one_clock
 from rig.observation.external.still_attitudes import find_frozen
+from rig.observation.time_stamps.stamp_order import order_stamps
 from support.external.followed_body import World, follow, turning
 
 WORLD = World(stops_s=(10.0,), stop_lasts_s=3.0, attitude_rad=0.0)
@@ -28,6 +29,12 @@ def test_long_rows_of_one_attitude_between_which_the_body_was_lifted_are_rests()
     rows = turning(follow(WORLD, 1))
     windows_s = np.array([[2.0, 4.0], [4.2, 6.0], [6.2, 8.0]])
     assert not find_frozen(windows_s, rows.attitudes[[0, 0, 0]], rows.time_s, rows.readings_rad_s).any()
+
+
+def test_times_from_coarse_stamps_are_compared_without_a_warning() -> None:
+    rows = turning(follow(World(), 1))
+    ordered = order_stamps(np.rint(10 * rows.time_s) / 10, rows.readings_rad_s)
+    check_one_clock(replace(rows, time_s=ordered.time_s), None)
 
 
 @pytest.mark.parametrize("late_s", [-2.0, 1.5])

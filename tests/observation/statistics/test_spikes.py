@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rig.estimation.arrays import Array
-from rig.observation.statistics.spikes import bridge_spikes, find_spikes
+from rig.observation.statistics.spikes import bridge_spikes, find_markers, find_spikes
 
 TIME_S = np.arange(4000) / 100
 AT = np.array([50, 700, 1503, 2222, 3900])
@@ -39,6 +39,22 @@ def test_a_bridged_reading_is_that_of_its_neighbours() -> None:
 @pytest.mark.parametrize("noise_rad_s", [2e-3, 0.05, 0.5])
 def test_noise_and_motion_have_no_spikes(noise_rad_s: float) -> None:
     assert not len(find_spikes(TIME_S, turning(noise_rad_s)))
+
+
+@pytest.mark.parametrize("step_rad_s", [1e-9, 5e-4, 2e-3])
+def test_a_number_that_comes_again_and_again_is_a_marker(step_rad_s: float) -> None:
+    rates = step_rad_s * np.rint((turning() + 0.03) / step_rad_s)
+    assert not len(find_markers(rates)), "coarse or not"
+    rates[10::40, 1] = 0.0
+    others = np.setdiff1d(find_markers(rates), np.arange(10, len(rates), 40))
+    assert len(find_markers(rates)) == 100 + len(others) and len(others) < 3, "a few readings are really 0"
+
+
+@pytest.mark.parametrize("step_rad_s", [0.01, 0.1])
+def test_coarse_readings_and_a_stuck_or_saturated_axis_have_no_markers(step_rad_s: float) -> None:
+    rates = np.clip(step_rad_s * np.rint(turning() / step_rad_s), -1.5, 1.5)
+    rates[2000:2300, 2] = 0.0
+    assert not len(find_markers(rates))
 
 
 def test_a_vibration_and_a_knock_that_rings_stay() -> None:
