@@ -1,6 +1,7 @@
 """The solution and checks of external readings, whose motion a file describes. Pure."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -101,6 +102,13 @@ def solve_external(read: ExternalReadings, settings: RunSettings, estimator: str
     solution, raise the estimator's Fault, or `nothing_solved` with every reason if there are several.
     """
     samples = samples_in(read.readings, "the recording")
+    with _mention(samples.omitted):
+        return _solve_samples(read, samples, settings, estimator)
+
+
+def _solve_samples(
+    read: ExternalReadings, samples: Samples, settings: RunSettings, estimator: str | None
+) -> ExternalResult:
     if read.tells == "turns":
         return _add_notes(_solve_turns(read, samples, estimator), read, samples)
     solved = (
@@ -161,7 +169,8 @@ def _solve_sweeps(
         )
     if reference_c is not None:
         data, polynomials = correct_files(data, reference_c)
-    solution, faults = _solve_remaining(data, chosen), dict[str, Fault]()
+    with _mention([omitted for omitted in data.omitted if omitted.what == "rows"]):
+        solution, faults = solve_swept(data, chosen), dict[str, Fault]()
     vector = (
         solution
         if isinstance(solution, VectorSolution | TurnedSolution)
@@ -195,14 +204,16 @@ def _solve_sweeps(
     )
 
 
-def _solve_remaining(data: ExternalData, estimator: BySweeps | None) -> Estimate:
-    """Return what `solve_swept` returns. If rows were left out, its errors mention them."""
+@contextmanager
+def _mention(omitted: Sequence[Omitted]) -> Iterator[None]:
+    """Let the errors of the block, a solution, mention what was left out before it."""
     try:
-        return solve_swept(data, estimator)
+        yield
     except (Fault, Refused) as error:
-        if not (rows := [str(omitted) for omitted in data.omitted if omitted.what == "rows"]):
+        if not omitted:
             raise
-        raise type(error)(error.name, f"{error.what}; left out: {'; '.join(rows)}", error.remedy) from None
+        what = f"{error.what}; left out before: {'; '.join(map(str, omitted))}"
+        raise type(error)(error.name, what, error.remedy) from None
 
 
 def solve_swept(data: ExternalData, estimator: BySweeps | None) -> Estimate:

@@ -126,6 +126,7 @@ class IncrementSolution:
         return len(self.aside_s)
 
 
+@refusals.convergence_required()
 def solve_known_increments(time_s: Array, readings: Array, fixes: Fixes, start: DriftState) -> IncrementSolution:
     """Estimate a gyroscope's matrix and bias from readings (n, 3) in rad/s at times (n,), without outlying increments.
 

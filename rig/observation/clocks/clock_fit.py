@@ -87,8 +87,10 @@ def _list_stages(
         count = round(over_s / step_s)
         if count < 2 or len(board_time_s) < MIN_SAMPLES * count:
             continue
-        slow = _SlowMotion(motion, count * step_s, start_s - 1.0, end_s + 1.0)
-        yield *_average_samples(board_time_s, readings, count), slow
+        time_s, means = _average_samples(board_time_s, readings, count)
+        if len(time_s) < MIN_SAMPLES / 2:  # uneven times seem to have gaps everywhere
+            continue
+        yield time_s, means, _SlowMotion(motion, count * step_s, start_s - 1.0, end_s + 1.0)
         if over_s == FINE_AVERAGE_S:
             return
     yield board_time_s, readings, motion
