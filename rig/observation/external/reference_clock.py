@@ -28,7 +28,8 @@ CRYSTAL_DRIFT_STD = 1e-4  # between two crystals
 MAX_STEP_INTERVALS, MAX_STEP_DRIFT_FRACTION = 2.5, 0.2
 MIN_DRIFT, MIN_DRIFT_STDS = 5e-4, 6.0  # more than any crystal's, and more than chance
 MAX_UNEXPLAINED = 0.1  # fraction, above which the rows may be inverse rotations
-MIN_AGREEMENT = 0.7  # fraction of the readings' variance that shows another offset of the clocks
+# Fraction of the variance of all readings, and of a quarter of them, that shows another offset of the clocks.
+MIN_AGREEMENT, MIN_PART_AGREEMENT = 0.7, 0.95
 MIN_EXPLAINED = 0.3  # fraction of the readings' variance, by the coarse offset
 
 
@@ -84,18 +85,38 @@ def check_one_clock(turning: Turning, rates_rad_s: Array | None) -> None:
 
 
 def check_offset(turning: Turning) -> None:
-    """Raise Fault `clocks_apart` if the rotation of rows and readings agrees after another offset of the clocks."""
-    motion = or_fault(lambda: TableMotion(turning.rows_s.mean(axis=1), turning.attitudes, None))
+    """Raise Fault `clocks_apart` if the rotation of rows and readings agrees after another offset of the clocks.
+
+    If the first and the last quarter of the readings agree after different offsets, a clock was set in between. One
+    step back in the order of the rows shows this too.
+    """
+    middles_s = turning.rows_s.mean(axis=1)
+    backward = np.flatnonzero(np.diff(middles_s) < 0)
+    if len(backward) == 1:
+        at_s, next_s = middles_s[backward[0] : backward[0] + 2].tolist()
+        raise _clock_set(f"whose clock was set back by {at_s - next_s:.2g} s after {at_s:.10g} s")
+    motion = or_fault(lambda: TableMotion(middles_s, turning.attitudes, None))
     if isinstance(motion, Fault):
         return
-    explained, offset_s = estimate_coarse_offset(turning.time_s, turning.readings_rad_s, motion)
+    quarter = len(turning.time_s) // 4
+    (explained, offset_s), (first, before_s), (last, after_s) = (
+        estimate_coarse_offset(turning.time_s[part], turning.readings_rad_s[part], motion)
+        for part in (slice(None), slice(quarter), slice(-quarter, None))
+    )
     if explained >= MIN_AGREEMENT and abs(offset_s) > MAX_CLOCK_S:
-        raise Fault(
-            "clocks_apart",
-            f"the readings contradict the attitudes, but agree with them if these are {abs(offset_s):.2g} s too "
-            f"{'late' if offset_s > 0 else 'early'}",
-            "Write both files by one clock, or let --estimate-clock-offset find the difference",
-        )
+        late = "late" if offset_s > 0 else "early"
+        raise _clock_set(f"but agree with them if these are {abs(offset_s):.2g} s too {late}")
+    if min(first, last) >= MIN_PART_AGREEMENT and abs(after_s - before_s) > MAX_CLOCK_S:
+        raise _clock_set(f"but agree with them if a clock was set by {abs(after_s - before_s):.2g} s in between")
+
+
+def _clock_set(what: str) -> Fault:
+    return Fault(
+        "clocks_apart",
+        f"the readings contradict the attitudes, {what}",
+        "Write both files by one clock, or give the part before or after a step; --estimate-clock-offset finds a "
+        "constant difference",
+    )
 
 
 def _find_steady_clock(turning: Turning, motion: TableMotion) -> tuple[TimeBase, float]:

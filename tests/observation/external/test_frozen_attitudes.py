@@ -43,3 +43,13 @@ def test_another_offset_of_the_clocks_that_explains_the_readings_is_named(late_s
     check_offset(rows)
     with pytest.raises(Fault, match=f"clocks_apart: .* {abs(late_s):g} s too {'late' if late_s > 0 else 'early'}"):
         check_offset(replace(rows, rows_s=rows.rows_s + late_s))
+
+
+@pytest.mark.parametrize(
+    ("step_s", "name"), [(2.0, r"set by (2|1\.9) s in between"), (-3.0, "set back by 3 s after 2[45]")]
+)
+def test_a_clock_that_was_set_during_the_recording_is_named(step_s: float, name: str) -> None:
+    rows = turning(follow(World(), 1))
+    rows_s = rows.rows_s + (step_s + 1e-4) * (rows.rows_s[:, :1] > 25)
+    with pytest.raises(Fault, match=f"clocks_apart: .* {name}"):
+        check_offset(replace(rows, rows_s=rows_s))
