@@ -25,6 +25,7 @@ PASSES = 3  # spikes that are close together hide each other
 # Readings of one value that are markers; their ratio to the readings of each of the nearest values, so many on either
 # side, and to those of this quantile of all values; least fraction of them that the readings before differ from.
 MIN_MARKERS, MIN_MARKER_RATIO, NEAREST, USUAL_QUANTILE, MIN_ALONE = 5, 5.0, 2, 0.9, 0.5
+SAME_SPAN_FRACTION = 1e-9  # of an axis' span: values that are closer are equal but for rounding
 SHIFTS = [shift for shift in range(2 * NEAREST + 1) if shift != NEAREST]
 
 
@@ -51,12 +52,13 @@ def find_markers(rates: Array) -> NDArray[np.intp]:
     that is stuck, or at the end of its range, repeats them one after the other.
     """
     marked = np.zeros(len(rates), dtype=np.bool_)
-    for axis in rates.T:
-        values, index, counts = np.unique(axis, return_inverse=True, return_counts=True)
-        starts = np.append(True, axis[1:] != axis[:-1])[: len(axis)]  # of runs of equal readings
+    for axis in rates.T if len(rates) else ():
+        merged = np.rint(axis / max(SAME_SPAN_FRACTION * float(np.ptp(axis)), np.finfo(np.float64).tiny))
+        values, index, counts = np.unique(merged, return_inverse=True, return_counts=True)
+        starts = np.append(True, merged[1:] != merged[:-1])[: len(axis)]  # of runs of equal readings
         alone = np.bincount(index[starts], minlength=len(values))
         padded = np.pad(counts, NEAREST)
-        usual = float(np.quantile(counts, USUAL_QUANTILE)) if len(counts) else 1.0
+        usual = float(np.quantile(counts, USUAL_QUANTILE))
         near = np.max([padded[shift : shift + len(values)] for shift in SHIFTS], axis=0, initial=usual)
         is_marker = (counts >= np.maximum(MIN_MARKERS, MIN_MARKER_RATIO * near)) & (alone >= MIN_ALONE * counts)
         marked |= is_marker[index]
