@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from rig.data.quantity import RATE, Quantity
 from rig.data.recording.motion_file import MOTIONS, QUATERNION, TIME, Header
 from rig.errors import Fault, Refused, or_fault
-from rig.estimation.arrays import Array
+from rig.estimation.arrays import Array, unwrap_counter
 from rig.observation.clocks.time_base import TimeBase
 from rig.observation.external.csv_samples import Samples
 from rig.observation.external.csv_windows import (
@@ -49,6 +49,7 @@ from rig.observation.formats.csv_table import CsvTable, blank_cell, read_table
 from rig.observation.formats.sample_files import attitudes_in, rows_around
 from rig.observation.motion.interpolated_attitudes import find_interpolated
 from rig.observation.time_stamps.sampling import find_sampling
+from rig.observation.time_stamps.stamp_order import find_restart_s
 from rig.observation.windows import Window, inside
 
 RATE_COLUMNS = ("rate_x_rad_s", "rate_y_rad_s", "rate_z_rad_s")
@@ -109,14 +110,16 @@ def read_attitudes(
     """Return the columns (N,) of a file of attitudes in any format; `mapped` describes columns with other names.
 
     Times of a text table are relative to `origin_s`. A row with `time_s` in place of `start_s` and `end_s` is valid at
-    one instant. If `inverse`, the quaternions in the file take table to body coordinates. Raise as `attitudes_in` does;
-    Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`.
+    one instant; if a counter of this time restarted, it goes on. If `inverse`, the quaternions in the file take table
+    to body coordinates. Raise as `attitudes_in` does; Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`.
     """
     in_format = attitudes_in(path)
     if in_format is None:
         columns = _drop_other_rows(path, read_table(path, MOMENTS, ATTITUDES_MB, mapped, origin_s))
         if TIME in columns:
-            columns |= rows_around(columns.pop(TIME), path)
+            time_s = columns.pop(TIME)
+            period_s = find_restart_s(time_s)
+            columns |= rows_around(time_s if period_s is None else unwrap_counter(time_s, period_s), path)
     else:
         columns = dict(in_format)
     if inverse:

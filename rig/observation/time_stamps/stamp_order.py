@@ -137,22 +137,31 @@ def _drop_zeros(log: _UnorderedLog) -> _UnorderedLog:
 
 
 def _unwrap(log: _UnorderedLog) -> _UnorderedLog:
-    """Return the log with continuous stamps, if a counter restarted at zero.
+    """Return the log with continuous stamps, if a counter restarted at zero."""
+    period_s = find_restart_s(log.stamps_s)
+    if period_s is None:
+        return log
+    stamps_s = unwrap_counter(log.stamps_s, period_s)
+    return log.restamp(
+        stamps_s, stamps_s > log.stamps_s, f"their counter restarts after {period_s:.10g} s, which are added"
+    )
+
+
+def find_restart_s(stamps_s: Array) -> float | None:
+    """Return the period after which the counter of stamps (n,) restarted at zero, None if it did not.
 
     A clock that was set back by about a counter's period is no restart: then the step over it is unusual.
     """
-    steps_s = np.diff(log.stamps_s)
+    steps_s = np.diff(stamps_s)
     backward_steps = np.flatnonzero(steps_s < 0)
     if not len(backward_steps):
-        return log
+        return None
     longest_s = MAX_RESTART_RATIO * float(steps_s.max())
     for period_s in WRAPS_S:
         over_s = steps_s[backward_steps] + period_s
-        if ((over_s >= 0) & (over_s <= longest_s)).all() and np.ptp(log.stamps_s) <= period_s:
-            stamps_s = unwrap_counter(log.stamps_s, period_s)
-            reason = f"their counter restarts after {period_s:.10g} s, which are added"
-            return log.restamp(stamps_s, stamps_s > log.stamps_s, reason)
-    return log
+        if ((over_s >= 0) & (over_s <= longest_s)).all() and np.ptp(stamps_s) <= period_s:
+            return period_s
+    return None
 
 
 def _drop_repeated(log: _UnorderedLog) -> _UnorderedLog:

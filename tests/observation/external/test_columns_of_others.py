@@ -143,6 +143,16 @@ def test_one_time_of_a_pose_is_a_moment_around_it(tmp_path: Path) -> None:
     assert rows["qw"] == pytest.approx(np.cos(TIME_S / 4)) and rows["qx"] == pytest.approx(np.sin(TIME_S / 4))
 
 
+def test_a_counter_of_poses_that_restarts_goes_on(tmp_path: Path) -> None:
+    path = poses(tmp_path)
+    heading, *rows = path.read_text(encoding="utf-8").splitlines()
+    counted_s = np.mod(TIME_S + 60, 65.536)
+    later = [f"{time_s:.6f},{row.partition(',')[2]}" for time_s, row in zip(counted_s.tolist(), rows, strict=True)]
+    path.write_text("\n".join([heading, *later]) + "\n", encoding="utf-8")
+    found = read_attitudes(path, map_motion(ColumnMap.model_validate({"motion": POSES})))
+    assert (found["start_s"] + found["end_s"]) / 2 == pytest.approx(60 + TIME_S, abs=1e-6)
+
+
 def test_comments_below_the_readings_are_no_rows(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     rows = [f"{t:.2f},0.1,0.2,0.3" for t in TIME_S]
