@@ -29,6 +29,7 @@ from rig.observation.windows import Window, inside
 
 MAX_REST_ANGLE_RAD = 0.02  # between rows of one rest, beyond which the body was turned about the measured vector
 MAX_KNOCK_S = 1.0  # after which equal readings show that the body did not move
+MAX_DISTURBANCE_S = 2.0  # in a dwell
 MIN_STILL_FRACTION = 0.5  # of a dwell in which the body lies still; otherwise the whole dwell is left out
 
 
@@ -95,7 +96,8 @@ def find_placements(time_s: Array, readings: Mapping[Quantity, Array], rows: Att
     dwells = np.array([window.end_s - window.start_s >= MIN_DWELL_S for window in rows.windows])
     windows_s = np.array([(window.start_s, window.end_s) for window in rows.windows])
     lying = still_windows(windows_s, rows.attitudes)
-    joined = _join_rests(time_s, readings, find_rests(time_s, readings, lying=lying))
+    stated = [window for window, lasts in zip(rows.windows, dwells.tolist(), strict=True) if lasts]
+    joined = _join_rests(time_s, readings, find_rests(time_s, readings, lying=lying), stated)
     rests = [
         _PlacedRest(number, windows, np.concatenate([_closed_slice(time_s, window) for window in windows]))
         for number, windows in enumerate(joined)
@@ -129,26 +131,36 @@ def _closed_slice(time_s: Array, window: Window) -> NDArray[np.intp]:
     return np.arange(first, last)
 
 
-def _join_rests(time_s: Array, readings: Mapping[Quantity, Array], rests: Sequence[Window]) -> list[tuple[Window, ...]]:
-    """Return the rests, joined across a knock if the readings before and after agree and the body has not turned."""
+def _join_rests(
+    time_s: Array, readings: Mapping[Quantity, Array], rests: Sequence[Window], dwells: Sequence[Window]
+) -> list[tuple[Window, ...]]:
+    """Return the rests, joined across a knock if the readings before and after agree and the body has not turned.
+
+    A knock is short, but within one of the `dwells`, which state one attitude, it may be longer.
+    """
     joined: list[tuple[Window, ...]] = []
     for rest in rests:
-        if joined and _same_rest(time_s, readings, joined[-1][-1], rest):
+        before_s = joined[-1][-1].end_s if joined else rest.start_s
+        is_inner = any(dwell.start_s <= before_s and rest.start_s <= dwell.end_s for dwell in dwells)
+        longest_s = MAX_DISTURBANCE_S if is_inner else MAX_KNOCK_S
+        if joined and _same_rest(time_s, readings, joined[-1][-1], rest, longest_s):
             joined[-1] = (*joined[-1], rest)
         else:
             joined.append((rest,))
     return joined
 
 
-def _same_rest(time_s: Array, readings: Mapping[Quantity, Array], before: Window, after: Window) -> bool:
-    """Return whether the body lay still between two rests.
+def _same_rest(
+    time_s: Array, readings: Mapping[Quantity, Array], before: Window, after: Window, longest_s: float
+) -> bool:
+    """Return whether the body lay still between two rests, but for a knock of `longest_s` at most.
 
     In a gap of a gyroscope's readings the body may have turned, so the other quantities must show that it has not.
     """
     between = _closed_slice(time_s, Window(before.end_s, after.start_s))
     gap_s = float(np.diff(time_s[between]).max())
     has_gap = gap_s > BLOCK_S
-    if after.start_s - before.end_s > MAX_KNOCK_S + (gap_s if has_gap else 0.0):
+    if after.start_s - before.end_s > longest_s + (gap_s if has_gap else 0.0):
         return False
     cuts = (_closed_slice(time_s, before), _closed_slice(time_s, after))
     first, *others = (quantity for quantity in quantities().values() if quantity in readings)

@@ -16,15 +16,17 @@ FACES = np.array([[0, 0, 1], [1, 0, 0], [0, 1, 0], [0, 0, -1]])
 ATTITUDES = Rotation.from_euler("xyz", [(0, 0, 0), (0, 90, 0), (-90, 0, 0), (180, 0, 0)], degrees=True).as_matrix()
 
 
-def laid(*gaps_s: tuple[float, float], turned: tuple[int, ...] = (), gyroscope: bool = False) -> Placements:
+def laid(
+    *gaps_s: tuple[float, float], turned: tuple[int, ...] = (), gyroscope: bool = False, shaken_s: float = 0.0
+) -> Placements:
     """Return the placements of four dwells without the readings in the gaps; in the dwells `turned` the body is
-    turned over meanwhile.
+    turned over meanwhile. From 16 s on it is shaken for `shaken_s`.
     """
     rng, time_s = np.random.default_rng(1), np.arange(round(4 * (DWELL_S + MOVE_S) * HZ)) / HZ
     dwell, since_s = np.divmod(time_s, DWELL_S + MOVE_S)
     forces = 9.81 * FACES[dwell.astype(int)] + 0.01 * rng.normal(size=(len(time_s), 3))
     rates = 1e-3 * rng.normal(size=forces.shape)
-    moves = since_s > DWELL_S
+    moves = (since_s > DWELL_S) | ((time_s > 16) & (time_s < 16 + shaken_s))
     forces[moves] += 3 * rng.normal(size=(moves.sum(), 3))
     rates[moves] += rng.normal(size=(moves.sum(), 3))
     forces[np.isin(dwell, turned) & (since_s > DWELL_S / 2)] *= -1
@@ -44,6 +46,13 @@ def test_a_gap_with_equal_readings_before_and_after_costs_those_in_it(lasts_s: f
     (missing,) = placements.omitted
     assert missing.count == round(HZ * lasts_s) and missing.reason == "lost_samples: they are missing"
     assert missing.first == "at 15.98 s, in row 2"
+
+
+def test_a_body_shaken_in_a_dwell_that_lies_as_before_costs_those_readings() -> None:
+    placements = laid(shaken_s=1.6)
+    (moved,) = placements.omitted
+    assert len(placements.attitudes) == 4 and moved.reason == "not_at_rest: the body was knocked or moved"
+    assert moved.count == pytest.approx(1.6 * HZ, abs=HZ / 2)
 
 
 def test_a_gap_in_which_the_body_may_move_is_called_a_gap() -> None:
