@@ -163,6 +163,11 @@ def test_a_clock_that_was_set_back_is_named_with_row_and_time(back_s: float) -> 
         ordered(stamps_s)
 
 
+def test_a_clock_that_stands_still_is_named() -> None:
+    with pytest.raises(Refused, match="time_not_increasing: the samples has the time 17 s in all of its 3000 samples"):
+        ordered(np.full(COUNT, 17.0))
+
+
 @pytest.mark.parametrize(
     ("unit_s", "period"), [(1e-6, 2.0**32), (1e-3, 2.0**16), (1.0, 86_400.0)], ids=["us-32", "ms-16", "midnight"]
 )

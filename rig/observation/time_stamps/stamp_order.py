@@ -232,7 +232,13 @@ def _drop_held(log: _UnorderedLog) -> _UnorderedLog:
 
 
 def _check_rising(log: _UnorderedLog, where: str) -> None:
-    """Raise Refused `time_not_increasing` if the log could not be sorted, because its clock was set back."""
+    """Raise Refused `time_not_increasing` for a clock that stands still, or was set back, so that nothing is sorted."""
+    if len(log.rows) > 1 and not np.ptp(log.stamps_s):
+        raise Refused(
+            "time_not_increasing",
+            f"{where} has the time {log.stamps_s[0]:.10g} s in all of its {len(log.rows)} samples",
+            "Name the column that holds the time, with all of its digits",
+        )
     backward_steps = np.flatnonzero(np.diff(log.stamps_s) < 0)
     if not len(backward_steps):
         return
