@@ -8,6 +8,7 @@ import pytest
 from rig.data.quantity import ACCELERATION, RATE
 from rig.observation.by_hand.rests import find_rests
 from rig.observation.external.csv_samples import read_samples
+from rig.observation.windows import Window
 from support.external.real import unpack
 from support.external.turned_body import Hand, turn
 from support.paths import DOCS
@@ -69,3 +70,18 @@ def test_a_short_turn_against_the_bias_is_no_rest_though_it_reads_zero() -> None
     readings[1000:, 2] += 0.05
     rests = find_rests(time_s, {RATE: readings})
     assert [(round(rest.start_s), round(rest.end_s)) for rest in rests] == [(0, 8), (10, 18)]
+
+
+def test_of_a_turn_that_lasts_longer_than_the_rests_a_declared_rest_is_told() -> None:
+    time_s = np.arange(2800) / 100
+    readings = 1e-3 * np.random.default_rng(4).normal(size=(2800, 3))
+    readings[400:2400, 2] += 0.5
+    rests = find_rests(time_s, {RATE: readings}, lying=[Window(0.5, 3.5)])
+    assert [(round(rest.start_s), round(rest.end_s)) for rest in rests] == [(0, 4), (24, 28)]
+
+
+def test_noise_that_grows_far_below_what_counts_as_steady_ends_no_rest() -> None:
+    time_s = np.arange(1000) / 100
+    noise_rad_s = np.where(time_s < 2, 1e-6, 1e-5)[:, None]
+    (rest,) = find_rests(time_s, {RATE: noise_rad_s * np.random.default_rng(5).normal(size=(1000, 3))})
+    assert (round(rest.start_s), round(rest.end_s)) == (0, 10)

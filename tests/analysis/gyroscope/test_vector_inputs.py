@@ -28,3 +28,11 @@ def test_a_resumed_recording_begins_after_the_last_one_ended_for_any_time_of_the
     assert (windows[1:, 0] > windows[:-1, 1]).all()
     off = np.array([*result.scale, *result.bias_rad_s]) - truth(SETUP)
     assert (np.abs(off) < 4 * np.sqrt(np.diag(result.uncertainty.covariance))).all()
+
+
+def test_the_noise_of_an_arm_s_states_counts_in_each_sweep_by_its_weights() -> None:
+    result = calibrate([synthetic_run(SETUP)]).results["gyro"]
+    assert result.explained is not None
+    gains = [turn.state_gain for turn in result.observations]
+    np.testing.assert_array_equal(result.explained.inputs.state_gains, [*gains, *np.ones(6)])
+    assert 0.5 < min(gains) and max(gains) < 1
