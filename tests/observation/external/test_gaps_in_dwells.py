@@ -55,6 +55,11 @@ def test_a_body_shaken_in_a_dwell_that_lies_as_before_costs_those_readings() -> 
     assert moved.count == pytest.approx(1.6 * HZ, abs=HZ / 2)
 
 
+def test_a_gap_in_the_first_dwell_is_named_like_any_other() -> None:
+    (missing,) = laid((4.0, 5.0)).omitted
+    assert (missing.count, missing.first) == (HZ, "at 3.98 s, in row 1")
+
+
 def test_a_gap_in_which_the_body_may_move_is_called_a_gap() -> None:
     placements = laid((16.0, 18.0), turned=(1,))
     assert len(placements.attitudes) == 3
