@@ -94,6 +94,18 @@ def as_csv(path: Path, table: dict[str, Any]) -> None:
     np.savetxt(path, columns, "%.9g", delimiter=",", header=",".join(table), comments="")
 
 
+@pytest.mark.parametrize("axis", [0, 2])
+def test_the_least_certain_scale_factor_is_the_one_that_is_checked(axis: int, tmp_path: Path) -> None:
+    table = dict(read_columns(EXAMPLES / "samples.csv", samples_header([RATE]), 256))
+    noise = 0.2 * np.random.default_rng(axis).normal(size=len(table[TIME]))
+    as_csv(tmp_path / "samples.csv", table | {RATE.columns[axis]: table[RATE.columns[axis]] + noise})
+    files = Files(tmp_path / "samples.csv", EXAMPLES / "sweeps.csv", "sweeps", Item("imu", "any", "1"))
+    found = calibrate([build_recording(files, STANDARD, SolveOptions())])
+    budget = found.results["imu"].uncertainty
+    assert budget is not None and np.argmax(budget.std[:3]) == axis
+    assert [check.value for check in found.checks if check.name == "imu.scale_std"] == [budget.std[axis]]
+
+
 @pytest.mark.slow
 def test_a_session_solves_to_the_same_numbers_from_all_three(tmp_path: Path) -> None:
     """The log holds floats of 32 bits, and whole microseconds; so do the other two then."""

@@ -5,10 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rig.data.recording.settings import ObservationThresholds
 from rig.errors import Fault
+from rig.motion.steps import Sweep
 from rig.observation.arm_rests import trim_rest
 from rig.observation.motion.arm_motion import motion_of
-from rig.observation.motion.even_turn import fit_lines
+from rig.observation.motion.even_turn import GUARD_RAD, find_even_turn, fit_lines
 from rig.observation.windows import iterate_rests, swept
 from support.motions.drawn_servo import Drawn, drawn_servo
 
@@ -64,3 +66,19 @@ def test_smoothed_rates_are_those_of_a_line() -> None:
     time_s = np.sort(np.random.default_rng(1).uniform(0, 4, 500))
     middles, angles, rates = fit_lines(time_s, (2.0 + 0.7 * time_s)[:, None])
     assert np.allclose(angles[:, 0], 2.0 + 0.7 * middles) and np.allclose(rates, 0.7)
+
+
+@pytest.mark.parametrize(("beyond", "is_whole"), [(0, False), (1, True)])
+def test_a_turn_is_whole_as_soon_as_one_state_shows_that_its_even_part_has_ended(beyond: int, is_whole: bool) -> None:
+    angle = np.arange(0.0, 9.0, 0.01)  # at 1 rad/s throughout
+    sweep = Sweep(0, 0, "shaft", "ccw", (0.0, 0.0, 1.0), (0.0,), (9.0,), 1.0, 5.0, 9.2, (1.36, 7.64))
+    last = np.flatnonzero(angle <= 9.0 - 0.1 - GUARD_RAD)[-1]
+    states = np.zeros(last + 1 + beyond, [("time_s", float), ("q_rad", float, 1)])
+    states["time_s"], states["q_rad"][:, 0] = angle[: len(states)], angle[: len(states)]
+    thresholds = ObservationThresholds(max_lost_fraction=0.01, max_speed_deviation=0.01, max_axis_deviation_deg=10.0)
+    if is_whole:
+        ends = find_even_turn(states, sweep, thresholds)
+        assert ends.end_s - ends.start_s == pytest.approx(2 * np.pi)
+    else:
+        with pytest.raises(Fault, match="incomplete_revolution"):
+            find_even_turn(states, sweep, thresholds)
