@@ -119,3 +119,9 @@ def test_a_plan_predicts_the_detection_limits_of_its_recording() -> None:
     for each in will:
         assert each.size == pytest.approx(recorded[each.what].size, rel=0.6), each.what
         assert each.unit == recorded[each.what].unit
+
+
+def test_a_fault_just_below_its_detection_limit_puts_a_result_off_by_a_few_u() -> None:
+    limits = held(drawn(3, KINDS["quiet LSM9DS1"]).run).detection_limits["gyro"]
+    off = [limit.off_by_expanded for limit in limits]
+    assert all(each is not None and 0.01 < each < 20 for each in off), off
