@@ -11,7 +11,7 @@ import yaml
 
 from rig.config.sensors.lines_section import LinesSection
 from rig.sensors.lines.guessed_section import section
-from rig.sensors.lines.guessing import Guess, guess
+from rig.sensors.lines.guessing import Guess, find_temperature, guess
 from rig.sensors.lines.shape import NoShape, Shape, TimedLine, find_shape
 from support.wires.printed_lines import add_checksum
 
@@ -246,3 +246,12 @@ def test_one_impossible_number_costs_its_line_and_a_silent_device_is_reported() 
     assert guess(shape, STILL_S).columns[0] == "sequence"
     with pytest.raises(NoShape, match="only 0 of its lines came while it lay still"):
         guess(shape, 0.0)
+
+
+@pytest.mark.parametrize(("mean", "name"), [(9, "-"), (11, "temperature"), (59, "temperature"), (61, "-")])
+def test_a_nearly_constant_column_without_a_name_is_the_temperature_from_10_to_60(mean: float, name: str) -> None:
+    values = mean + 0.1 * np.sin(np.arange(50.0))[:, None]
+    guessed = Guess(["-"])
+    shape = Shape("comma", "", (), False, (), values, np.arange(50.0), (-1,), 0)
+    find_temperature(shape, guessed, np.ones(50, np.bool_))
+    assert guessed.columns == [name]
