@@ -12,6 +12,7 @@ from rig.errors import Fault
 from rig.estimation.by_hand.session_parts import HandRecording, HandRest, Move, SessionConditions
 from rig.estimation.by_hand.solution import solve_by_hand
 from rig.motion.by_hand import FACES
+from rig.observation.by_hand.hand_segmentation import Segmenter
 from rig.observation.by_hand.rests_and_moves import NotCounted, rotate_face
 from support.paths import RECORDINGS
 
@@ -107,3 +108,8 @@ def test_stamps_that_no_clock_gives_are_refused(step: int, name: str) -> None:
     samples["board_time_us"] = 2_000_000_000 + step * np.arange(len(samples))
     with pytest.raises(Fault, match=f"{name}: "):
         calibrate_by_hand([replace(run, samples={"gyro": samples})])
+
+
+def test_before_the_first_reading_a_session_is_starting_and_has_no_rest() -> None:
+    segmenter = Segmenter()
+    assert segmenter.live.state == "starting" and segmenter.handled.rests == ()

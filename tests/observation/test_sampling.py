@@ -27,6 +27,12 @@ def test_few_readings_at_random_times_have_their_mean_interval(count: int) -> No
     assert found.interval_s == pytest.approx(np.diff(stamped_s).mean()) and not found.missing.any()
 
 
+def test_a_window_expects_the_readings_of_its_duration_within_the_recording_and_beyond_it() -> None:
+    time_s = taken(100.0, 1000)
+    windows_s = np.array([(0.0, 9.99), (2.0, 3.0), (-1.0, 1.0), (9.0, 12.0)])
+    assert find_sampling(time_s).count_expected(time_s, windows_s) == pytest.approx([999, 100, 200, 300])
+
+
 @pytest.mark.parametrize(("rate_hz", "stamps"), ROUNDED + FINE + BURSTS + LATE)
 def test_nothing_is_lost_where_stamps_are_only_bad(rate_hz: float, stamps: Stamps) -> None:
     count = COUNT - COUNT % stamps.burst  # whole packets
