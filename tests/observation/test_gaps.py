@@ -37,6 +37,14 @@ def test_of_a_swinging_body_it_hides_what_bridging_errs_by(lasts_s: float, at_s:
     assert hidden > 1e-3
 
 
+@pytest.mark.parametrize("lasts_s", [0.05, 0.17])
+def test_a_gap_about_the_fastest_moment_of_a_swing_hides_as_much_though_the_rates_next_to_it_agree(
+    lasts_s: float,
+) -> None:
+    hidden, true = hidden_and_true(3 * np.sin(2 * np.pi * TIME_S), lasts_s, 29.25 - lasts_s / 2)
+    assert 1e-3 < true < 2.5 * hidden
+
+
 def test_a_long_gap_hides_all_and_a_short_one_in_a_swing_is_not_bridged() -> None:
     assert np.isinf(hidden_and_true(np.zeros(len(TIME_S)), 1.5, 30.0)[0])
     time_s = np.delete(TIME_S, np.s_[3000:3017])

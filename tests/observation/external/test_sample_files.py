@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from rig.errors import Refused
 from rig.observation.external.attitude_import import read_attitudes
 from rig.observation.external.csv_samples import read_sample_table, read_samples
 from rig.observation.external.from_files import Files, build_recording
+from rig.observation.formats.bag_samples import bag_readings
 from rig.observation.formats.csv_table import read_columns
 from rig.observation.formats.sample_files import entry_of
 from rig.report.document import document_of
@@ -70,6 +72,33 @@ def write_bag(path: Path, table: dict[str, Any], poses: dict[str, Any] | None = 
             bag.write(connection, at, store.serialize_cdr(message, kind))
 
 
+@pytest.mark.parametrize(
+    ("stated", "other", "is_read"),
+    [
+        ("float64[9] angular", "float32[9] angular", False),
+        ("float64 w", f"float64 w\n{'=' * 80}\nMSG: own/msg/Extra\nfloat64 x", True),
+    ],
+)
+def test_a_bag_whose_messages_have_another_layout_than_ros_is_refused_and_further_types_do_not_matter(
+    tmp_path: Path, stated: str, other: str, is_read: bool
+) -> None:
+    from rosbags.rosbag2 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    kind = "sensor_msgs/msg/Imu"
+    definition, digest = get_typestore(Stores.ROS2_JAZZY).generate_msgdef(kind, ros_version=2)
+    assert stated in definition
+    with Writer(tmp_path / "bag", version=9) as bag:
+        imu = bag.add_connection("/imu", kind, msgdef=definition.replace(stated, other), rihs01=digest)
+        # stamp, the length of an empty name with its end, the numbers
+        bag.write(imu, BEGAN_NS, struct.pack(">4xiII4x37d", 0, 0, 1, *np.zeros(37)))
+    if is_read:
+        assert list(bag_readings(tmp_path / "bag", None))
+    else:
+        with pytest.raises(ValueError, match="sensor_msgs/msg/Imu differs from that of ROS"):
+            list(bag_readings(tmp_path / "bag", None))
+
+
 def solved(samples: Path, sweeps: Path) -> np.ndarray:
     """Scale, bias and their covariance, as a gyroscope's readings and their sweeps give them."""
     item = Item("imu", "any", "1")
@@ -92,6 +121,12 @@ def test_readings_of_sensors_that_sweeps_do_not_need_may_be_blank(tmp_path: Path
 def as_csv(path: Path, table: dict[str, Any]) -> None:
     columns = np.column_stack(list(table.values()))
     np.savetxt(path, columns, "%.9g", delimiter=",", header=",".join(table), comments="")
+
+
+def test_what_the_user_should_know_of_the_sweeps_of_a_file_is_among_the_notes() -> None:
+    files = Files(EXAMPLES / "samples.csv", EXAMPLES / "sweeps.csv", "sweeps", Item("imu", "any", "1"))
+    notes = calibrate([build_recording(files, STANDARD, SolveOptions())]).external["imu"].notes
+    assert notes == ("all 6 turns count by their mean speed: the body moves before or after them",)
 
 
 @pytest.mark.parametrize("axis", [0, 2])
