@@ -8,6 +8,7 @@ import pytest
 from rig.analysis.reference.accelerometer import stack_sweeps
 from rig.data.quantity import ACCELERATION
 from rig.data.recording.settings import Site
+from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.reference.accelerometer_model import LEVER, NO_DWELLS, PARAMETERS, Movement, predicted
 from rig.estimation.reference.reference_model import REFERENCE
@@ -45,6 +46,20 @@ def test_the_first_harmonic_is_free_of_the_acceleration_by_wrists_that_sway(hert
         kept, removed = (np.linalg.lstsq(waves, values, rcond=None)[0] for values in (expected - found, expected))
         assert np.abs(removed).max() > 1e-4, "m/s², more than a good accelerometer's noise in a turn"
         assert np.abs(kept).max() < 0.1 * np.abs(removed).max() + 1e-5
+
+
+def test_an_acceleration_at_the_end_of_the_range_in_a_turn_is_refused() -> None:
+    run, sensor = synthetic_run(STEADY), load_recording("imu").sensors["gyro"]
+    motion, finished = motion_of(run), next(swept(run))
+    time_s = np.arange(motion.time_s[0] + 0.1, motion.time_s[-1] - 0.1, 0.02)
+    raw = np.zeros(len(time_s), dtype=[("acceleration_counts", "i4", 3)])
+    turn = motion.turn(finished.sweep, finished.window, run.settings.observation)
+    middle = np.searchsorted(time_s, (turn.start_s + turn.end_s) / 2)
+    raw["acceleration_counts"][middle] = sensor.channel(ACCELERATION).full_scale_counts
+    clock = TimeBase(0.0, 0.0, 0.0, np.zeros((2, 2)), np.zeros(3))
+    stream = Stream(sensor, clock, time_s, time_s, np.zeros((len(time_s), 3)), raw)
+    with pytest.raises(Fault, match=r"saturation: in .* 1 accelerations are at the end"):
+        swept_acceleration(stream, motion, finished.sweep, turn, run.settings)
 
 
 def test_gravity_axis_and_lever_arm_of_a_turn_belong_to_the_pose_about_which_wrists_sway() -> None:
