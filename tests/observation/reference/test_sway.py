@@ -49,7 +49,7 @@ def test_the_first_harmonic_is_free_of_the_acceleration_by_wrists_that_sway(hert
 
 
 def test_an_acceleration_at_the_end_of_the_range_in_a_turn_is_refused() -> None:
-    run, sensor = synthetic_run(STEADY), load_recording("imu").sensors["gyro"]
+    run, sensor = synthetic_run(Setup(speed_deg_s=120)), load_recording("imu").sensors["gyro"]
     motion, finished = motion_of(run), next(swept(run))
     time_s = np.arange(motion.time_s[0] + 0.1, motion.time_s[-1] - 0.1, 0.02)
     raw = np.zeros(len(time_s), dtype=[("acceleration_counts", "i4", 3)])
