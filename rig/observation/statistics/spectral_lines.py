@@ -14,6 +14,7 @@ from rig.estimation.statistics.mean_weights import invert_squares
 from rig.observation.statistics.tapered_weights import MAIN_LOBE, apply_window
 
 BINS = 161  # of the running median
+MAX_COPIES = 6  # of a spectrum, mirrored, in the running median: SciPy's filter reads beyond the end of shorter ones
 MAX_LINES = 8  # three of a servo, and vibrations of the room, each of which a turning sensor may sense as two
 MIN_DISTANCE = 2.5  # from a spectral line found before, in cycles of all readings
 MIN_LINE_CYCLES = 1.5  # closer spectral lines are one sudden motion, not two vibrations
@@ -163,6 +164,17 @@ def find_angle_change_rad2(residuals: Array, columns: Array, lines_hz: Array) ->
     return mean_squares
 
 
+def running_median(powers: Array) -> Array:
+    """Return the medians (axes, n) of powers (axes, n) over `BINS` around each, with the spectrum mirrored at its ends.
+
+    A short spectrum is mirrored `MAX_COPIES` times at most.
+    """
+    from scipy.ndimage import median_filter
+
+    width = min(BINS, MAX_COPIES * powers.shape[1] + 1)
+    return np.array([median_filter(axis, width) for axis in powers])  # one-dimensional: it takes a tenth of the time
+
+
 def _sampling_step(fraction: Array) -> float:
     """Return the interval between samples as a fraction of the whole time; samples may be missing."""
     steps = np.diff(fraction)
@@ -176,12 +188,9 @@ def _find_strongest(
 
     `spacing`: cycles from one bin of the spectrum to the next.
     """
-    from scipy.ndimage import median_filter
-
     powers = np.abs(np.fft.rfft(apply_window(residuals).T)) ** 2
     powers[:, :MAIN_LOBE] = powers[:, MAIN_LOBE, None]
-    around = np.array([median_filter(axis, BINS) for axis in powers])  # one-dimensional: it takes a tenth of the time
-    powers /= np.maximum(around, search.floor) + np.finfo(np.float64).tiny  # noise may have a colour
+    powers /= np.maximum(running_median(powers), search.floor) + np.finfo(np.float64).tiny  # noise may have a colour
     bins, last = np.arange(powers.shape[1]), powers.shape[1] - 1
     cycles = spacing * bins
     free = (cycles >= search.slowest) & (bins < last) & (np.abs(cycles - previous[:, None]) > MIN_DISTANCE).all(axis=0)

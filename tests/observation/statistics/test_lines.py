@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rig.observation.statistics.spectral_lines import LineSearch, find_lines, fit_columns, waves
+from rig.observation.statistics.spectral_lines import LineSearch, find_lines, fit_columns, running_median, waves
 
 COUNT, RATE_HZ, NOISE = 1200, 200.0, 4.5e-4
 STRICT = LineSearch(stands_out=30.0)
@@ -48,3 +48,14 @@ def test_two_vibrations_that_are_near_each_other_are_told_apart() -> None:
 
 def test_readings_too_few_to_tell_a_line_have_none() -> None:
     assert find_lines(residuals(1, 20.0, 0.1)[:40], STRICT).size == 0
+
+
+@pytest.mark.parametrize("bins", [6, 16, 26, 27, 200])
+def test_the_noise_around_a_line_is_the_median_of_its_neighbours(bins: int) -> None:
+    """Also where the spectrum, mirrored, is shorter than the median's window: SciPy's filter read other memory then."""
+    rng = np.random.default_rng(bins)
+    half = min(80, 3 * bins)
+    for powers in rng.exponential(size=(60, 1, bins)):
+        mirrored = np.pad(powers[0], half, mode="symmetric")
+        around = [np.median(mirrored[first : first + 2 * half + 1]) for first in range(bins)]
+        np.testing.assert_array_equal(running_median(powers), [around])
