@@ -33,6 +33,8 @@ GRAVITY_M_S2 = 9.81
 SPEED_RAD_S = 2 * np.pi * RATE_HZ / TURN_SAMPLES
 HOLDS = [f"{axis}_{side}" for axis in "xyz" for side in "pa"]
 UP = {f"{axis}_{side}": sign * np.eye(3)[i] for i, axis in enumerate("xyz") for side, sign in (("p", 1), ("a", -1))}
+RATES_RAD_S = np.concatenate([np.zeros((6, 3)), -SPEED_RAD_S * np.eye(3)])  # of the sections, and the gravity in them
+GRAVITIES_M_S2 = GRAVITY_M_S2 * np.concatenate([list(UP.values()), np.eye(3)])
 RUNS, ROUNDS = 300, 10
 
 
@@ -79,9 +81,8 @@ def solve_by_vector_model(samples: Session, *, with_gravity: bool = False) -> Ar
     means = np.add.reduceat(by_axis, begins, axis=1) / counts
     squares = (by_axis - np.repeat(means, counts, axis=1)) ** 2
     variances = np.add.reduceat(squares, begins, axis=1) / counts**2
-    rates = np.concatenate([np.zeros((6, 3)), -SPEED_RAD_S * np.eye(3)])
-    up = np.concatenate([list(UP.values()), np.eye(3)])
-    solved = solve_vector_model(means.T, rates, variances.T, gravity_m_s2=GRAVITY_M_S2 * up if with_gravity else None)
+    gravity = GRAVITIES_M_S2 if with_gravity else None
+    solved = solve_vector_model(means.T, RATES_RAD_S, variances.T, gravity_m_s2=gravity)
     return np.concatenate([solved.scale, solved.bias_rad_s])
 
 

@@ -112,16 +112,17 @@ def check_revolutions(means: Array, speeds_rad_s: Array, variances: Array, speed
 
 def check_duplicates(means: Array) -> None:
     """Raise Fault `duplicated_observation` if two mean readings of (N, 3) agree to the last bit."""
+    if len(set(map(tuple, means.tolist()))) == len(means):  # for a few rows faster than sorting them
+        return
     order = np.lexsort(means.T)
     same = (means[order[1:]] == means[order[:-1]]).all(axis=-1)
-    if same.any():
-        first = int(np.argmax(same))
-        earlier, again = sorted(order[first : first + 2].tolist())
-        raise Fault(
-            "duplicated_observation",
-            f"observations {earlier} and {again} hold the same readings",
-            "Give each recording once; a second sweep in one direction cannot replace the other direction",
-        )
+    first = int(np.argmax(same))
+    earlier, again = sorted(order[first : first + 2].tolist())
+    raise Fault(
+        "duplicated_observation",
+        f"observations {earlier} and {again} hold the same readings",
+        "Give each recording once; a second sweep in one direction cannot replace the other direction",
+    )
 
 
 def check_reads(matrix: Array) -> None:
