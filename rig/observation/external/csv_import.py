@@ -97,7 +97,7 @@ def read_sweeps(path: Path, mapped: MappedColumns | None = None, origin_s: int =
 def average_sweeps(samples: Samples, sweeps: Mapping[str, Array]) -> ExternalData:
     """Average samples, including a gyroscope's, over sweeps given by the columns of their file.
 
-    Raise Refused `time_not_increasing`, `bad_sweep`, `overlapping_sweeps`; Fault `stuck_sensor` and those of `average`.
+    Raise Refused `bad_sweep`, `overlapping_sweeps`; Fault `stuck_sensor`; and as `check_times` and `average` do.
     """
     check_reads(samples.readings[RATE], RATE)
     check_frozen(samples.time_s, samples.readings[RATE])
@@ -157,7 +157,7 @@ def average(samples: Array, sweeps: Array, axes: Array, temperature_c: Array | N
     """Average samples (n, 4) = [time_s, x, y, z] over sweeps (k, 3) = [start_s, end_s, speed_rad_s] about axes (k, 3).
 
     `temperature_c` (n,) is each sample's temperature, None without a thermometer. Raise Refused `time_not_increasing`,
-    `overlapping_sweeps`, `bad_sweep`; Fault `too_few_observations`, `clocks_apart`, `lost_samples`, `wrong_unit`.
+    `too_few_samples`, `overlapping_sweeps`, `bad_sweep`; Fault `too_few_observations`, `clocks_apart`, `lost_samples`, `wrong_unit`.
     """
     time_s, readings = samples[:, 0], samples[:, 1:]
     check_times(time_s)

@@ -176,7 +176,7 @@ def _refuse_separate_rows(
 def samples_in(table: Columns, where: str) -> Samples:
     """Return the readings in columns (n,), in the order of `order_stamps`; error messages call their source `where`.
 
-    Raise Refused `wrong_columns`, `wrong_unit`, `not_a_number`, `time_not_increasing`.
+    Raise Refused `wrong_columns`, `wrong_unit`, `not_a_number`, and as `check_times` does.
     """
     present = [quantity for quantity in quantities().values() if quantity.columns[0] in table]
     if not present:

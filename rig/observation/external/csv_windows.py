@@ -23,22 +23,21 @@ MIN_READ_FRACTION = 0.5  # of a row's readings: fewer do not determine its mean
 
 
 def check_times(time_s: Array, where: str = "the samples") -> None:
-    """Raise Refused `time_not_increasing`, naming `where`, for too few samples or times that do not rise."""
-    what = (
-        f"{where} has {len(time_s)} samples; at least {MIN_SAMPLES} are needed" if len(time_s) < MIN_SAMPLES else None
-    )
+    """Raise Refused `too_few_samples`, or `time_not_increasing` for times that do not rise; both name `where`."""
     steps_back = np.flatnonzero(~(np.diff(time_s) > 0))
     if len(steps_back):
         first = int(steps_back[0])
-        what = (
-            f"{where} has time_s {time_s[first + 1]:.9g} after {time_s[first]:.9g}, in sample {first + 2}, and "
-            f"{len(steps_back)} such steps in all: time_s must increase from row to row"
-        )
-    if what is not None:
         raise Refused(
             "time_not_increasing",
-            what,
+            f"{where} has time_s {time_s[first + 1]:.9g} after {time_s[first]:.9g}, in sample {first + 2}, and "
+            f"{len(steps_back)} such steps in all: time_s must increase from row to row",
             "Give every sample once, in the order of time, on one clock, with all digits of its time",
+        )
+    if len(time_s) < MIN_SAMPLES:
+        raise Refused(
+            "too_few_samples",
+            f"{where} has {len(time_s)} samples; at least {MIN_SAMPLES} are needed",
+            "Give the whole recording, or record for longer",
         )
 
 

@@ -56,7 +56,7 @@ def build_recording(
 ) -> RunData:
     """Return the recording of a calibration, over temperature if the reference temperature `reference_c` is given.
 
-    Raise Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`, `time_not_increasing`.
+    Raise Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`, and as `check_times` does.
     """
     column_map = files.columns
     needed = () if files.tells == "attitudes" else [RATE]

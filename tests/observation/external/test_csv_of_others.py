@@ -89,7 +89,7 @@ def test_headings_of_a_german_logger_are_found_in_any_encoding(tmp_path: Path, e
         (gzip.compress(PLAIN.encode(), mtime=0)[:30] + b"\xff" * 60, "no_file: .*log.csv cannot be read"),
         (
             "\n".join(PLAIN.splitlines()[:9]).encode(),
-            "time_not_increasing: .*log.csv has 8 samples; at least 20 are needed",
+            "too_few_samples: .*log.csv has 8 samples; at least 20 are needed",
         ),
         (
             PLAIN.replace("\n1.0,", "\n-1.0,").encode(),

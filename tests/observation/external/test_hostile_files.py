@@ -24,6 +24,7 @@ NAMES = (
     "wrong_columns",
     "not_a_number",
     "time_not_increasing",
+    "too_few_samples",
 )
 PEAK = """
 import resource, sys
