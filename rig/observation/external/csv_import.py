@@ -157,7 +157,8 @@ def average(samples: Array, sweeps: Array, axes: Array, temperature_c: Array | N
     """Average samples (n, 4) = [time_s, x, y, z] over sweeps (k, 3) = [start_s, end_s, speed_rad_s] about axes (k, 3).
 
     `temperature_c` (n,) is each sample's temperature, None without a thermometer. Raise Refused `time_not_increasing`,
-    `too_few_samples`, `overlapping_sweeps`, `bad_sweep`; Fault `too_few_observations`, `clocks_apart`, `lost_samples`, `wrong_unit`.
+    `too_few_samples`, `overlapping_sweeps`, `bad_sweep`; Fault `too_few_observations`, `clocks_apart`, `lost_samples`,
+    `wrong_unit`.
     """
     time_s, readings = samples[:, 0], samples[:, 1:]
     check_times(time_s)
