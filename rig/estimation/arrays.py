@@ -92,9 +92,13 @@ def divide_or_infinity(values: ArrayLike, sizes: ArrayLike) -> Array:
 
 def equal_runs(values: NDArray[Any]) -> NDArray[np.intp]:
     """Return the first index and the end (k, 2) of each run of equal values (n,); the end is exclusive."""
-    changes = np.flatnonzero(values[1:] != values[:-1]) + 1
-    bounds = np.concatenate([[0], changes, [len(values)]])
-    return np.column_stack([bounds[:-1], bounds[1:]])[: len(values)]
+    return runs_between(values[1:] != values[:-1], len(values))
+
+
+def runs_between(changes: NDArray[np.bool_], count: int) -> NDArray[np.intp]:
+    """Return the runs of `count` values, as `equal_runs` does; `changes` (count − 1,) marks where a new one begins."""
+    bounds = np.concatenate([[0], np.flatnonzero(changes) + 1, [count]])
+    return np.column_stack([bounds[:-1], bounds[1:]])[:count]
 
 
 def bisect(is_too_small: Callable[[Array], Array | NDArray[np.bool_]], highest: Array) -> Array:

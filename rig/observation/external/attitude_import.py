@@ -151,24 +151,21 @@ def average_placements(samples: Samples, table: Mapping[str, Array], *, find_clo
     table, numbers, not_reported = select_reports(table)
     rates = np.column_stack([table[name] for name in RATE_COLUMNS]) if RATE_COLUMNS[0] in table else None
     windows = _windows(table)
-    all_rows = rows_found = _ReferenceRows(windows, _rotations(table), rates, _attitude_std(table), numbers)
+    rows_found = _ReferenceRows(windows, _rotations(table), rates, _attitude_std(table), numbers)
     clock, rate, frozen = None, readings.get(RATE), tuple[Omitted, ...]()
     if rates is not None:
-        check_rates_agree(all_rows.rows_s.mean(axis=1), all_rows.attitudes, rates)
-    if rate is not None and not find_clock:
-        all_rows, frozen = _drop_frozen(all_rows, time_s, rate)
-        rows_found = all_rows
-        check_one_clock(
-            Turning(time_s, rate, rows_found.rows_s, rows_found.attitudes, rows_found.std_rad), rows_found.rates_rad_s
-        )
+        check_rates_agree(rows_found.rows_s.mean(axis=1), rows_found.attitudes, rates)
     if find_clock:
         _check_has_rates(readings)
-        clock = find_reference_clock(
-            Turning(time_s, readings[RATE], rows_found.rows_s, rows_found.attitudes, rows_found.std_rad), rates
-        )
+        clock = find_reference_clock(rows_found.join(time_s, readings[RATE]), rates)
         time_s = clock.controller_time_s(time_s)
-        all_rows, frozen = _drop_frozen(all_rows, time_s, readings[RATE])
-        rows_found = all_rows.select(np.flatnonzero(_is_covered(all_rows.rows_s, time_s)))
+    if rate is not None:
+        rows_found, frozen = _drop_frozen(rows_found, time_s, rate)
+    all_rows = rows_found
+    if find_clock:
+        rows_found = rows_found.select(np.flatnonzero(_is_covered(rows_found.rows_s, time_s)))
+    elif rate is not None:
+        check_one_clock(rows_found.join(time_s, rate), rows_found.rates_rad_s)
     if not rows_found.windows:
         raise clocks_apart(time_s, windows)
     check_overlap(time_s, rows_found.windows)
@@ -183,17 +180,15 @@ def average_placements(samples: Samples, table: Mapping[str, Array], *, find_clo
     lacking = tuple(_list_omitted(covered, sampled, MOSTLY_LACKING))
 
     def find() -> Placements:
-        if not sampled.windows:
-            _find_complete(rows_found, counts, expected)
+        if isinstance(whole, Fault) and not sampled.windows:
+            raise whole
         placements = find_placements(time_s, readings, placement_rows)
         return replace(placements, omitted=(*lacking, *placements.omitted))
 
     return PlacedReadings(
         tuple(readings),
         None if rate is None else whole if isinstance(whole, Fault) else _rows(time_s, rate, whole),
-        None
-        if rate is None
-        else Turning(time_s, rate, rows_found.rows_s, rows_found.attitudes, rows_found.std_rad, hides_losses),
+        None if rate is None else replace(rows_found.join(time_s, rate), hides_losses=hides_losses),
         None if set(readings) == {RATE} else or_fault(find),  # a gyroscope needs none
         clock,
         (*not_reported, *frozen, *_list_omitted(all_rows, covered, "not covered by the recording")),
@@ -227,6 +222,10 @@ class _ReferenceRows:
     def select(self, rows: NDArray[np.intp]) -> "_ReferenceRows":
         rates, std = (None if values is None else values[rows] for values in (self.rates_rad_s, self.std_rad))
         return _ReferenceRows([self.windows[row] for row in rows], self.attitudes[rows], rates, std, self.numbers[rows])
+
+    def join(self, time_s: Array, readings_rad_s: Array) -> Turning:
+        """Return the rows with a gyroscope's readings (n, 3) at times (n,)."""
+        return Turning(time_s, readings_rad_s, self.rows_s, self.attitudes, self.std_rad)
 
 
 def select_reports(rows: Mapping[str, Array]) -> tuple[dict[str, Array], NDArray[np.intp], tuple[Omitted, ...]]:

@@ -134,16 +134,10 @@ def _closed_slice(time_s: Array, window: Window) -> NDArray[np.intp]:
 def _join_rests(
     time_s: Array, readings: Mapping[Quantity, Array], rests: Sequence[Window], dwells: Sequence[Window]
 ) -> list[tuple[Window, ...]]:
-    """Return the rests, joined across a knock if the readings before and after agree and the body has not turned.
-
-    A knock is short, but within one of the `dwells`, which state one attitude, it may be longer.
-    """
+    """Return the rests, joined across a knock if the readings before and after agree and the body has not turned."""
     joined: list[tuple[Window, ...]] = []
     for rest in rests:
-        before_s = joined[-1][-1].end_s if joined else rest.start_s
-        is_inner = any(dwell.start_s <= before_s and rest.start_s <= dwell.end_s for dwell in dwells)
-        longest_s = MAX_DISTURBANCE_S if is_inner else MAX_KNOCK_S
-        if joined and _same_rest(time_s, readings, joined[-1][-1], rest, longest_s):
+        if joined and _same_rest(time_s, readings, joined[-1][-1], rest, dwells):
             joined[-1] = (*joined[-1], rest)
         else:
             joined.append((rest,))
@@ -151,15 +145,18 @@ def _join_rests(
 
 
 def _same_rest(
-    time_s: Array, readings: Mapping[Quantity, Array], before: Window, after: Window, longest_s: float
+    time_s: Array, readings: Mapping[Quantity, Array], before: Window, after: Window, dwells: Sequence[Window]
 ) -> bool:
-    """Return whether the body lay still between two rests, but for a knock of `longest_s` at most.
+    """Return whether the body lay still between two rests, but for a knock.
 
+    A knock is short, but within one of the `dwells`, which state one attitude, it may be longer.
     In a gap of a gyroscope's readings the body may have turned, so the other quantities must show that it has not.
     """
     between = _closed_slice(time_s, Window(before.end_s, after.start_s))
     gap_s = float(np.diff(time_s[between]).max())
     has_gap = gap_s > BLOCK_S
+    is_inner = any(dwell.start_s <= before.end_s and after.start_s <= dwell.end_s for dwell in dwells)
+    longest_s = MAX_DISTURBANCE_S if is_inner else MAX_KNOCK_S
     if after.start_s - before.end_s > longest_s + (gap_s if has_gap else 0.0):
         return False
     cuts = (_closed_slice(time_s, before), _closed_slice(time_s, after))

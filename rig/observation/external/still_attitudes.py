@@ -6,7 +6,7 @@ A reference that stops for some time repeats its last attitude, which looks like
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.estimation.arrays import Array, equal_runs, rotation_vectors
+from rig.estimation.arrays import Array, rotation_vectors, runs_between
 from rig.observation.false_readings import MIN_OTHER_CHANGE_RAD_S, MOTION_QUANTILES
 from rig.observation.windows import Window, inside
 
@@ -57,7 +57,7 @@ def find_frozen(windows_s: Array, attitudes: Array, time_s: Array, rates: Array)
     order = short[np.argsort(windows_s[short, 0], kind="stable")]
     middles_s = windows_s[order].mean(axis=1)
     new = (np.diff(attitudes[order], axis=0) != 0).any(axis=(1, 2)) | (np.diff(middles_s) > MIN_APART_S)
-    for first, end in equal_runs(np.cumsum(np.append(False, new))[: len(order)]).tolist():
+    for first, end in runs_between(new, len(order)).tolist():
         window = Window(middles_s[first] + MAX_CLOCK_S, middles_s[end - 1] - MAX_CLOCK_S)
         within = rates[inside(time_s, window)]
         if len(within) and np.ptp(np.quantile(within, MOTION_QUANTILES, axis=0), axis=0).max() > MIN_OTHER_CHANGE_RAD_S:

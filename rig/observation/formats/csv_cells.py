@@ -17,7 +17,8 @@ TIME_OF_DAY = re.compile(
 )
 MAX_FLOAT_TIME_S = 1e6  # a clock with a larger time started long before the recording: a float may lose microseconds
 SPELLINGS = (("^", ""), ("sec", "s"), ("²", "2"))  # spellings of units, in addition to those of the table
-COMMENT_MARKS = ("%", "#", "//")
+HEADING_MARKS = "#%"  # characters before the heading of a table by NumPy or MATLAB
+COMMENT_MARKS = (*HEADING_MARKS, "//")
 
 
 def is_number(cell: str) -> bool:
@@ -95,7 +96,7 @@ def is_comment(row: Sequence[str]) -> bool:
 
 def repeats(row: Sequence[str], headings: Sequence[str]) -> bool:
     """Return whether a row repeats the heading, as loggers write it when they restart or at regular intervals."""
-    return strip_blank_end([cell.strip().lstrip("#% ") for cell in row]) == strip_blank_end(headings)
+    return strip_blank_end([cell.strip().lstrip(f"{HEADING_MARKS} ") for cell in row]) == strip_blank_end(headings)
 
 
 def find_wrong_unit(cells: Sequence[str], factors: Sequence[float]) -> int | None:

@@ -14,13 +14,12 @@ from typing import BinaryIO
 
 from rig.config.files.regular_file import UnfitFile, open_regular_file
 from rig.errors import Refused
-from rig.observation.formats.csv_cells import is_value
+from rig.observation.formats.csv_cells import HEADING_MARKS, is_value
 
 MAX_HARMLESS_BYTES = 1_000_000  # some ten thousand rows, which take four times as much memory
 MAX_LINE = 10_000  # characters: enough for a hundred columns, of which there are at most twenty
 GZIP, UTF_16 = b"\x1f\x8b", (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 SEPARATORS = ";\t"
-COMMENT_MARKS = "#%"  # characters before the heading of a table by NumPy or MATLAB
 
 
 def read_rows(path: Path, largest_mb: int, skipped: int = 0) -> Iterator[list[str]]:
@@ -29,7 +28,7 @@ def read_rows(path: Path, largest_mb: int, skipped: int = 0) -> Iterator[list[st
         lines = _lines(text, largest_mb * 1_000_000)
         first = next(islice(lines, skipped, None), "")
         second = next(lines, "")
-        first = first.lstrip(f"{COMMENT_MARKS} ") or first
+        first = first.lstrip(f"{HEADING_MARKS} ") or first
         other = next((mark for mark in SEPARATORS if mark in first and (mark in second or "," not in first)), None)
         if other is None and is_divided_by_spaces(second):
             yield from (split_at_spaces(line) for line in chain([first, second], lines))

@@ -22,9 +22,10 @@ SIDE_READINGS, SPIKE_READINGS = 10, 5
 # deviation of a spike's neighbours from their cubics, relative to the spike's own; its tolerance
 NEIGHBOUR_RATIO, NEIGHBOUR_TOLERANCE = -2 / 3, 0.2
 PASSES = 3  # spikes that are close together hide each other
-# Readings of one value that are markers; their ratio to the readings of each of the nearest values, so many on either
-# side, and to those of this quantile of all values; least fraction of them that the readings before differ from.
-MIN_MARKERS, MIN_MARKER_RATIO, NEAREST, USUAL_QUANTILE, MIN_ALONE = 5, 5.0, 2, 0.9, 0.5
+MIN_MARKERS = 5  # readings of one value
+MIN_MARKER_RATIO = 5.0  # of their number to that of each of the nearest values, and of the usual one
+NEAREST, USUAL_QUANTILE = 2, 0.9  # values on either side; of the numbers of readings of all values
+MIN_ALONE = 0.5  # fraction of them that the reading before differs from
 SAME_SPAN_FRACTION = 1e-9  # of an axis' span: values that are closer are equal but for rounding
 SHIFTS = [shift for shift in range(2 * NEAREST + 1) if shift != NEAREST]
 

@@ -189,8 +189,9 @@ def find_typical_interval_s(time_s: Array) -> float:
 
     If most stamps are equal, it is the mean interval.
     """
-    intervals_s = [_interval_quantile(time_s, apart) for apart in (*LONG_WIDTHS, len(time_s) - 1)]
-    return min((interval_s for interval_s in intervals_s[:-1] if interval_s > 0), default=intervals_s[-1])
+    intervals_s = [_interval_quantile(time_s, apart) for apart in LONG_WIDTHS]
+    mean_s = float(np.ptp(time_s)) / (len(time_s) - 1)
+    return min((interval_s for interval_s in intervals_s if interval_s > 0), default=mean_s)
 
 
 def _count_missing(time_s: Array, width: int, quantile: float) -> _PeriodCandidate:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.errors import Refused
-from rig.estimation.arrays import Array, equal_runs, unwrap_counter
+from rig.estimation.arrays import Array, runs_between, unwrap_counter
 from rig.observation.time_stamps.even_times import find_sampling_times
 from rig.observation.time_stamps.moving_values import find_least_ahead
 from rig.observation.time_stamps.sampling import (
@@ -216,7 +216,7 @@ def _drop_held(log: _UnorderedLog) -> _UnorderedLog:
     """
     steps = np.diff(log.readings, axis=0)
     same = (steps == 0).all(axis=1)
-    runs = equal_runs(np.cumsum(np.append(False, ~same))[: len(log.readings)])
+    runs = runs_between(~same, len(log.readings))
     runs = runs[runs[:, 1] - runs[:, 0] >= MIN_HELD]
     runs = runs[runs[:, 1] < len(log.readings)]
     if not len(runs):
@@ -245,15 +245,15 @@ def _check_rising(log: _UnorderedLog, where: str) -> None:
     first = int(backward_steps[0])
     before_s, after_s = log.stamps_s[first : first + 2].tolist()
     back_s = before_s - after_s + float(np.median(np.diff(log.stamps_s)))
-    more, counter = "", ""
+    more, give = "", "Give"
     if len(backward_steps) > 1:
         more = f", the first of {len(backward_steps)} such steps"
-        counter = "State with --columns where it begins again (wraps_at), if it is a counter; otherwise give "
+        give = "State with --columns where it begins again (wraps_at), if it is a counter; otherwise give"
     raise Refused(
         "time_not_increasing",
         f"{where} has time_s {after_s:.9g} after {before_s:.9g}, in sample {log.rows[first + 1] + 1}{more}: the clock "
         f"was set back by about {back_s:.4g} s, and nothing shows which of the two is right",
-        f"{counter or 'Give '}the part before it or the part after it, with a motion on the same clock",
+        f"{give} the part before it or the part after it, with a motion on the same clock",
     )
 
 
