@@ -53,9 +53,9 @@ def _leave_out_rests(factors: Sequence[Factor], rests: Collection[int]) -> list[
 
 
 def _allow_jumps(factors: Sequence[Factor], rests: Sequence[int]) -> Iterator[list[Factor]]:
-    """Yield the factors without one of the `rests`' links to its neighbours, so that the bias may jump there.
+    """Yield the factors with one of `rests` in use again, but with a jump of the bias allowed before or after it.
 
-    The other ones of these rests are left out.
+    The readings of the other `rests` remain left out.
     """
     for rest, first in product(rests, (-1, 0)):
         kept = _leave_out_rests(factors, {*rests} - {rest})
@@ -63,7 +63,10 @@ def _allow_jumps(factors: Sequence[Factor], rests: Sequence[int]) -> Iterator[li
 
 
 def _distances_from_neighbours(times_s: Array, biases: Array, left_out: Sequence[int]) -> Array:
-    """Return the distance (n,) of each bias (n, 3) from the line between its neighbours; 0 next to an unused rest."""
+    """Return the distance (n,) of each bias (n, 3) from the value interpolated between its two neighbours in time.
+
+    The distance is 0 at both ends, in a rest that is left out, and next to one.
+    """
     distances = np.zeros(len(times_s))
     for row in range(1, len(times_s) - 1):
         if not {row - 1, row, row + 1} & set(left_out):

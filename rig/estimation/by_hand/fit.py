@@ -1,6 +1,6 @@
 """The solution of the graph by Gauss–Newton steps, with the hand's variance components from the residuals.
 
-Each component is estimated from the factors that it affects, weighted by their redundancy numbers (Förstner 1979). The
+Each component is estimated from the factors that it affects, weighted by their redundancy numbers (Förstner 1979). Its
 value in `STATED` serves as a prior with `PRIOR_DOF` degrees of freedom, so a short session changes it little.
 """
 

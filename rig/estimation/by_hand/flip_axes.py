@@ -18,7 +18,7 @@ MAX_RATE_RAD_S = 150.0  # no gyroscope of this kind reads as much: the unit is d
 
 
 def check_axes(session: HandRecording) -> None:
-    """Raise Fault `wrong_unit`, `mirrored_axis`, `swapped_axes` or `wrong_mounting` if quarter turns show this.
+    """Raise Fault `wrong_unit`, `mirrored_axis`, `swapped_axes` or `wrong_mounting` if quarter turns show this error.
 
     If no single map from the accelerometer's axes to the gyroscope's explains all quarter turns, nothing is raised:
     rests were then missed, so that several moves look like one.
@@ -54,7 +54,7 @@ def check_axes(session: HandRecording) -> None:
 
 
 def _check_turned(unit: Array) -> None:
-    """Raise Fault `wrong_mounting` if the gyroscope's axes, rows (3, 3), are rotated far from the accelerometer's."""
+    """Raise Fault `wrong_mounting` if the gyroscope's axes, the rows of `unit`, are far from the accelerometer's."""
     angle_rad = float(np.linalg.norm(rotation_vectors(nearest_rotation(unit)[None])[0]))
     if angle_rad > MAX_FRAME_ANGLE_RAD:
         raise Fault(

@@ -225,7 +225,10 @@ def reading_noise(session: HandRecording) -> float:
 
 
 def _hand_held_std(scatter: Array, quiet: float, lasting_s: float) -> float:
-    """Return the std of a rest's mean reading due to a hand's tremor, from the part of `scatter` (3,) above `quiet`."""
+    """Return the std, due to a hand's tremor, of the mean reading of a rest of `lasting_s`.
+
+    The tremor is the part of the readings' std `scatter` (3,) that exceeds the std `quiet` of a body at rest.
+    """
     beyond = float(np.mean(scatter**2)) - (QUIET_SCATTER_RATIO * quiet) ** 2
     return float(np.sqrt(max(beyond, 0.0) / max(TREMOR_BANDWIDTH_HZ * lasting_s, 1.0)))
 
@@ -255,7 +258,10 @@ def _move(graph: Graph, row: int) -> Factor:
 
 
 def _tilt_factor(graph: Graph, row: int) -> Factor:
-    """Return the factor of a turn by α about a face's normal n: the part of ∫(reading − b) dt/α = F n across F n."""
+    """Return the factor of a turn by α about a face's normal n.
+
+    Its two rows are the components perpendicular to F n of the equation ∫(reading − b) dt / α = F n.
+    """
     normal, matrix = graph.faces.up[row], graph.state.matrix
     integral_rad, duration_s = graph.integrals.swept_rad[row], graph.integrals.durations_s[row]
     angle_rad = float(normal @ integral_rad)

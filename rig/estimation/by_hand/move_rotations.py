@@ -26,8 +26,8 @@ class MoveIntegrals:
       `by_nonlinearity` (k, 3, 6).
     - `swept_rad` (k, 3): the integral of the reading minus offset, g-sensitivity and nonlinearity.
     - `durations_s` (k,) of the moves; `paths_rad` (k,): the total angle turned, in whichever direction.
-    - `changes_rad_s` (k,): the root sum of squares of the rate's changes from sample to sample. Multiplied by the time
-      stamps' standard deviation, it is their contribution to the rotation's standard deviation.
+    - `changes_rad_s` (k,): the root sum of squares of the rate's changes from sample to sample. This times the standard
+      deviation of the time stamps is the part of the rotation's standard deviation due to the stamps.
     """
 
     rotations: Array

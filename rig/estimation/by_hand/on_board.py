@@ -28,7 +28,7 @@ CURVATURE_FRACTION = 0.02
 
 @dataclass(frozen=True, slots=True)
 class BoardRest:
-    """A rest of `samples` readings with their mean (3,); `face` 0 to 5: which of +x -x +y -y +z -z points upwards."""
+    """A rest of `samples` readings with their mean (3,); `face` is the upward axis, an index into +x -x +y -y +z -z."""
 
     face: int
     mean_rad_s: Array
@@ -101,7 +101,7 @@ def _equations(centre: Array, move: BoardMove) -> Iterator[Equation]:
 
 
 def _vertical_on_face(centre: Array, face: int) -> tuple[Array, Array]:
-    """Return the vertical (3,) in the body's frame with `face` up, and its change (3, 2) per rad of that face."""
+    """Return the vertical (3,) in the body with `face` up, and its change (3, 2) per rad of the face's two angles."""
     axis, leans = face // 2, centre[FACES][2 * face : 2 * face + 2]
     up, face_axes = np.zeros(3), np.zeros((3, 2))
     face_axes[(axis + 1) % 3, 0] = face_axes[(axis + 2) % 3, 1] = 1.0

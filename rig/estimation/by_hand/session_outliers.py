@@ -39,7 +39,7 @@ LIVE_DROP_LIMIT = 8.0  # during the session, in which a move can be repeated: 1 
 
 @dataclass(frozen=True, slots=True)
 class FaultHypothesis:
-    """A possible fault of the rest or move `index`, and the drop of χ² if its equations need not hold."""
+    """A possible fault of the rest or move `index`, and the drop of χ² if the affected equations need not hold."""
 
     name: str
     index: int
@@ -47,7 +47,7 @@ class FaultHypothesis:
 
 
 def find_contradiction(fit: GraphFit, since: int | None = None) -> Fault | None:
-    """Return the fault of a session, or of its part that begins at the rest `since`; None without one."""
+    """Return the fault of a session, or of its part that begins at the rest `since`; None if there is no fault."""
     worst = max(_test_hypotheses(fit, since), key=lambda hypothesis: hypothesis.chi_square_drop, default=None)
     if worst is not None and worst.chi_square_drop > (CHI_SQUARE_DROP_LIMIT if since is None else LIVE_DROP_LIMIT):
         return describe_fault(fit, worst)
@@ -55,7 +55,7 @@ def find_contradiction(fit: GraphFit, since: int | None = None) -> Fault | None:
 
 
 def find_masked_fault(fit: GraphFit) -> Fault | None:
-    """Return the fault of the one rest or turn that inflates the stds of the hand's moves; None without one."""
+    """Return the fault of the one rest or turn that inflates the stds of the hand's moves; None if none does."""
     if not _much_larger(fit.stds, STATED):
         return None
     hypotheses = sorted(_test_hypotheses(fit, None), key=lambda hypothesis: hypothesis.chi_square_drop)
@@ -203,7 +203,7 @@ def describe_fault(fit: GraphFit, hypothesis: FaultHypothesis) -> Fault:
 
 
 def _describe_jump(index: int, rests: Sequence[HandRest]) -> Fault:
-    """Return the Fault of a bias that jumped in the move `index`; at the first and last rest it may be a creep."""
+    """Return the Fault of a bias that jumped in the move `index`; at the first or last rest a creep looks the same."""
     after_s = rests[index + 1].start_s
     what = f"the gyroscope had another bias after the move that ended at {after_s:.1f} s"
     if index == len(rests) - 2:
@@ -240,7 +240,7 @@ def _find_excessive_std(fit: GraphFit) -> Fault | None:
 
 
 def _find_unlikely_box(fit: GraphFit) -> Fault | None:
-    """Return a fault if the faces are further out of square than stated, by χ² of their normals, else None.
+    """Return a Fault if χ² of the faces' normals shows that the faces are further out of square than stated, else None.
 
     A scale factor that changes in mid-session looks like a skewed box, because the faces follow the moves' angles.
     """

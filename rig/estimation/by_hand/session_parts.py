@@ -59,7 +59,7 @@ class Move:
 class HandRecording:
     """All readings (n, 3) at times (n,), the rests (N,), and the N − 1 moves between them.
 
-    `held_in_air_s`, `creeping_s`: times at which the body was held still in the air, or crept on the table.
+    The body was held still in the air in the intervals `held_in_air_s`, and crept on the table in `creeping_s`.
     """
 
     time_s: Array
@@ -76,7 +76,7 @@ class SessionConditions:
     """Statements of the operator about a session.
 
     - `clock_ppm`: half-width of the clock's error; `clock_source` states where it comes from.
-    - `box_rad`: standard deviation of the faces from a rectangular box.
+    - `box_rad`: standard deviation of the angles by which the faces deviate from those of a rectangular box.
     - `closure`: whether the body was turned against an edge, so that whole turns end where they began.
     - `first_face`: the axis of the body that first pointed upwards; needed without an accelerometer.
     """
@@ -94,7 +94,8 @@ class HandStds:
     """Standard deviations of a hand's errors, and of a sensor's errors outside the model.
 
     - `repeat_rad`: of the attitude when a face is laid down again; `closure_rad`: of the heading after a whole turn.
-    - `of_angle`: of the angle of a quarter turn, about each axis; `walk_rad_s_sqrt_s`: of the bias from rest to rest.
+    - `of_angle`: of the rotation about each axis in a quarter turn, as a fraction of the angle.
+    - `walk_rad_s_sqrt_s`: of the bias from rest to rest.
     - `acceleration_m_s2`: of an accelerometer's reading at rest, across the vertical.
     """
 
@@ -113,7 +114,7 @@ MAX_STDS = HandStds(5e-3, 2e-2, 3e-3, 1e-3, 0.05)  # plausible errors of handlin
 class RestFaces:
     """The face of each rest (N,), that is, the axis that pointed upwards, or None.
 
-    `up` (N, 3): this axis, or without a face the measured vertical; `turns` (N − 1,): the whole turns of each move.
+    `up` (N, 3) is this axis, or the measured vertical if the face is None; `turns` (N − 1,) are the moves' whole turns.
     """
 
     faces: tuple[str | None, ...]

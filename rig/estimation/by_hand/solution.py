@@ -96,7 +96,7 @@ class HandSolution:
 
     @property
     def bias_rad_s(self) -> Array:
-        """The biases (3,) b of g = K (m + b) at the last rest."""
+        """The biases b (3,) at the last rest, in the model rate = K (reading + b)."""
         return self.turned.bias_rad_s
 
     @property
@@ -242,7 +242,7 @@ def _check_precision(fit: GraphFit) -> Fault | None:
 
 
 def _looseness(fit: GraphFit) -> float:
-    """Return the ratio of estimated to stated std of the faces, or of the moves if theirs is larger."""
+    """Return the larger of two ratios of estimated to stated std: that of the faces and that of the moves."""
     stds = fit.stds
     return max(stds.repeat_rad / STATED.repeat_rad, stds.of_angle / STATED.of_angle)
 
