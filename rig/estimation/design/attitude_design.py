@@ -137,7 +137,7 @@ def _rms(variances: Array) -> float:
 
 
 def _ideal(reference: Array, order: Order) -> Array:
-    """Return the parameters θ (p,) of an ideal sensor: F = 1, no bias, no nonlinearity."""
+    """Return the parameters (p,) of an ideal sensor: F = I, no bias, no nonlinearity, and the `reference`."""
     theta = np.zeros(18 if order == 2 else 15)
     theta[[0, 4, 8]] = 1.0
     theta[REFERENCE] = reference

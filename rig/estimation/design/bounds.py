@@ -29,7 +29,10 @@ def six_observation_bound(scale: ArrayLike, rates_rad_s: ArrayLike, variances_ra
 
 
 def vector_matrix_bound(rates_rad_s: ArrayLike, variances_rad2_s2: ArrayLike) -> Array:
-    """Return the Cramér–Rao bound (12, 12) for the rows of F, then c, of m = F ω + c; rates (N, 3) may be zero."""
+    """Return the Cramér–Rao bound (12, 12) for the rows of F, then the offset c, of the readings F ω + c.
+
+    `rates_rad_s` ω (N, 3) may be zero.
+    """
     rates, variances = (np.asarray(a, dtype=np.float64) for a in (rates_rad_s, variances_rad2_s2))
     design = np.concatenate([rates, np.ones((len(rates), 1))], axis=1)
     bound = np.zeros((12, 12))
@@ -40,7 +43,10 @@ def vector_matrix_bound(rates_rad_s: ArrayLike, variances_rad2_s2: ArrayLike) ->
 
 
 def vector_bound(matrix: ArrayLike, rates_rad_s: ArrayLike, variances_rad2_s2: ArrayLike) -> Array:
-    """Return the Cramér–Rao bound (6, 6) for kx ky kz bx by bz if rates are vectors; `matrix` (3, 3) is the true F."""
+    """Return the Cramér–Rao bound (6, 6) for kx, ky, kz, bx, by, bz if the rates are known as vectors.
+
+    `matrix` (3, 3) is the true F.
+    """
     f = np.asarray(matrix, dtype=np.float64)
     jacobian = parameter_jacobian(f, scale_of(f))
     return jacobian @ vector_matrix_bound(rates_rad_s, variances_rad2_s2) @ jacobian.T
