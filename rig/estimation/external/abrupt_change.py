@@ -1,7 +1,7 @@
 """An abrupt change of a sensor within a recording, by the ratio of marginal likelihoods.
 
 A change happens before one of the rows, or increments, of a mixed model: the sensor's bias or the scale factors of its
-axes change by δ ~ N(0, size² 1), or the coordinates of a reference's attitudes turn by δ. The ratio of the likelihoods
+axes change by δ ~ N(0, size² I), or the coordinates of a reference's attitudes turn by δ. The ratio of the likelihoods
 with and without such a term is the Bayes factor (Kass and Raftery, J. Am. Stat. Assoc. 90 (1995) 773). The factor is
 first computed for every row, with the other errors' standard deviations fixed. For the most probable row these standard
 deviations are then estimated again, together with the change; otherwise they would include the change.
@@ -97,7 +97,7 @@ def find_change(
 
 
 def _weigh_rows(effects: PossibleChanges, inverse: Array, innovation: Array) -> Array:
-    """Return ln of the Bayes factor (n,) of a change before each row: (sᵀ (1 + H)⁻¹ s − ln det(1 + H))/2.
+    """Return ln of the Bayes factor (n,) of a change before each row: (sᵀ (I + H)⁻¹ s − ln det(I + H))/2.
 
     s = Aᵀ P y and H = Aᵀ P A, where A (3n, 3) contains the effects of the change. `inverse` P (3n, 3n) and `innovation`
     P y (3n,) are those of the restricted likelihood of the readings y. For a change that lasts, s and H are sums over

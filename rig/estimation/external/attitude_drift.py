@@ -269,8 +269,8 @@ def _correlate(fixes: Fixes) -> Array:
     """Return the correlation (N, N), from fix to fix, of an error that varies smoothly with attitude.
 
     The error is averaged in each fix. At two attitudes R and R′ its correlation is Matérn's function, ν = 3/2, of the
-    chordal distance ‖R − R′‖/√2, which is nearly the angle if small. This function is positive definite on SO(3)
-    (Rasmussen and Williams, Gaussian Processes for Machine Learning (2006), 4.2).
+    chordal distance ‖R − R′‖/√2, nearly the angle between them if this is small. The function is positive definite on
+    SO(3) (Rasmussen and Williams, Gaussian Processes for Machine Learning (2006), 4.2).
     """
     counts = np.bincount(fixes.fix)
     begins = np.cumsum(counts) - counts
@@ -308,7 +308,7 @@ def _find_matrix_changes(sensitivities: Array, nearby: Array) -> Array:
 
 
 def _weigh_bias(averaged: FixedAttitudes, fixes: Fixes) -> Array:
-    """Return the weights (n,), of sum 1, of the increments in the mean bias, in proportion to their durations.
+    """Return the weights (n,) of the increments in the mean bias: in proportion to their durations, with the sum 1.
 
     A gyroscope's bias is its reading at rest, so increments in motion have weights only if there is too little rest.
     """

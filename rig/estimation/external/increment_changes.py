@@ -38,11 +38,11 @@ def find_increment_change(
 def find_reset(
     averaged: FixedAttitudes, fixes: Fixes, aside: NDArray[np.bool_], change: AbruptChange | None
 ) -> tuple[float, float] | None:
-    """Return time and angle (rad) of the largest lasting rotation of the attitudes' coordinates, None without one.
+    """Return time and angle (rad) of the largest lasting rotation of the attitudes' coordinates, or None.
 
     A new origin of the reference rotates all later attitudes, so the rotations of consecutive outliers add up to a
-    lasting one. At a single wrong attitude, the rotations of the increments before and after it cancel. `aside`
-    (N − 1,) is a mask of the increments between `fixes` that are outliers. A `change` of the attitudes, found among the
+    lasting one. At a single wrong attitude, the rotations of the increments before and after it cancel. `aside` (N −
+    1,) is a mask of the increments between `fixes` that are outliers. A `change` of the attitudes, found among the
     other increments, is returned if it is larger.
     """
     turned: tuple[float, float] | None = None

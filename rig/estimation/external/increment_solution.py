@@ -1,8 +1,8 @@
 """A gyroscope's matrix and bias from its rotations between attitudes of a reference, such as cameras or a table.
 
-The reference's rates are not used: noise in the regressors would bias the scale (errors in variables). The rotation
-between fixes (measured attitudes) is used (`attitude_drift`); the gyroscope's part of its noise grows only with the
-square root of time.
+The reference's rates are not used, because their noise would bias the scale (errors in variables). Instead the rotation
+between two fixes (measured attitudes) is compared with the integrated readings (`attitude_drift`), whose noise grows
+only with the square root of time.
 
 Matrix and bias may change between intervals of the recording, by nonlinearity, g-sensitivity and temperature. The
 variances of these changes, and of the errors of fixes and gyroscope, are estimated from the residuals
@@ -171,7 +171,7 @@ class _ConvergedFit:
 
 
 def _settle(recorded: AttitudeSamples, state: DriftState) -> _ConvergedFit:
-    """Solve by Gauss–Newton; the variances are re-estimated in the first iterations only."""
+    """Return the fit after Gauss–Newton steps from `state`; only the first steps re-estimate the variances."""
     maxima: Array | None = None
     for iteration in range(1, MAX_ITERATIONS + 1):
         averaged = average_fixes(recorded, state)
@@ -305,7 +305,7 @@ def _build_result(settled: _ConvergedFit, aside_s: Array) -> IncrementSolution:
 
 
 def _widen_by_axes(settled: _ConvergedFit, wanted: Array, covariance: Array) -> Array:
-    """Return the covariance (q, q) that the reference's inclined axes add to combinations `wanted` (q, p) of θ."""
+    """Return the covariance (q, q) that inclined axes of the reference add to the combinations `wanted` (q, p) of θ."""
     inclinations = find_inclinations(settled.averaged, settled.fixes, settled.state.matrix)
     return inclinations.widen(settled.model, settled.std, settled.solved, wanted, np.diag(covariance))
 

@@ -1,13 +1,13 @@
 """Errors of repeated placements: what a placement adds to a reading in addition to noise and tilt.
 
-    v_m = F (s + φ s²) + b + E ε + η,   ε ~ N(0, δ² 1),   η ~ N(0, ζ² 1)
+    v_m = F (s + φ s²) + b + E ε + η,   ε ~ N(0, δ² I),   η ~ N(0, ζ² I)
 
 s is the reference in body axes; the parameters θ are the matrix F, the nonlinearity φ, the bias b and the reference. ε
 rotates the body (`rig.estimation.reference.attitude_error`) and does not change the norm of the reference. η changes
 the norm, for example by a bias that depends on stress or temperature, or by a local disturbance. Longer dwells reduce
 neither ε nor η. A solution from six faces has hardly any redundancy to separate ζ from δ. So θ and its covariance are
-averaged over ζ and δ, weighted by the restricted likelihood, a uniform prior of δ and a half-Cauchy prior of ζ with a
-scale of a milli-g (Gelman, Bayesian Analysis 1 (2006) 515).
+averages over ζ and δ. The weights are the restricted likelihood times the prior, which is uniform in δ and half-Cauchy
+in ζ with a scale of a milli-g (Gelman, Bayesian Analysis 1 (2006) 515).
 
 Rests in an unknown attitude determine ζ as well, because the reference's norm is the same in every attitude.
 """
@@ -67,7 +67,7 @@ class _LinearisedPlacements:
     std_rad: Array
 
     def fits(self, delta: float, zetas: Array) -> "_PlacementFits":
-        """Return the fits with the attitude error δ and each placement error ζ (k,), by one Gauss–Newton step each."""
+        """Return a fit, by one Gauss–Newton step, for the attitude error `delta` and each placement error `zetas`."""
         tilts = self.turned * np.hypot(self.std_rad, delta)[:, None, None]
         errors = {
             NOISE: np.eye(3) * self.variances[:, :, None],

@@ -2,7 +2,9 @@
 
     m_j = F ω_j + c + (h  or  diag(h) F ω_j,  from one row on) + errors of the stated motion + noise
 
-The stated rates and axes err by a fraction that the rows themselves determine.
+m_j is the mean reading at the stated rate ω_j of a sensor with the matrix F and the offset c; h (3,) is the change of
+the bias, or the relative change of each axis' scale factor. The rows themselves determine how large the errors are of
+the stated rates and axes.
 """
 
 from collections.abc import Sequence

@@ -1,6 +1,6 @@
-"""The only attitude that determines a scale factor, so that no other attitude shows whether it is wrong.
+"""The only attitude that determines a scale factor, so that no other attitude shows whether this one is wrong.
 
-Repeated rests in one attitude agree even if the attitude is wrong, so they only show that placements repeat.
+Repeated rests in one attitude agree even if the attitude is wrong, so they only show how well placements repeat.
 """
 
 import numpy as np
@@ -58,7 +58,7 @@ def _group(verticals: Array) -> NDArray[np.intp]:
 
 
 def _find_std(rows: Array, wanted: Array) -> Array:
-    """Return the standard deviations (k,) of combinations `wanted` (k, q) that whitened rows (N, 3, q) determine."""
+    """Return the std (k,) that whitened rows (N, 3, q) give to the combinations `wanted` (k, q) of q parameters."""
     flat = rows.reshape(-1, rows.shape[-1])
     scale = np.linalg.norm(flat, axis=0)
     scale = np.where(scale > 0, scale, 1.0)
