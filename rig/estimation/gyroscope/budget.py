@@ -1,8 +1,8 @@
 """The uncertainty budget of scale and bias: its contributors and their combination.
 
-A contributor is one or several patterns of error in the mean readings; the solution's response maps a pattern to
-changes of scale and bias (JCGM 100, 5.1). Half-widths are those of uniform distributions (4.3.7): the standard
-uncertainty is the half-width over √3.
+A contributor is one or several patterns of error in the mean readings. The solution's response, its derivative with
+respect to these readings, maps a pattern to changes of scale and bias (JCGM 100, 5.1). Half-widths are those of uniform
+distributions (4.3.7): the standard uncertainty is the half-width over √3.
 """
 
 from collections.abc import Callable, Collection, Iterator
@@ -161,7 +161,7 @@ def _contributors(explained: VectorFit, unknown: UnknownErrors) -> Iterator[Cont
     matrix = solution.matrix
 
     def propagate(patterns: Array) -> Array:
-        """Return the covariance (6, 6) of scale and bias due to independent patterns (k, N, 3) of one std, rad/s."""
+        """Return the covariance (6, 6) of scale and bias due to k independent errors whose stds are `patterns`."""
         effects = np.einsum("qni,kni->kq", solution.response, patterns)
         covariance: Array = effects.T @ effects
         return covariance
@@ -252,7 +252,7 @@ def _evaluate_times(
 
 
 def _find_noise_dof(explained: VectorFit) -> float:
-    """Return the smallest of the degrees of freedom of scale and bias, (6,), for noise alone (JCGM 100, G.4.1)."""
+    """Return the smallest of the six degrees of freedom of scale and bias for noise alone (JCGM 100, G.4.1)."""
     variances = explained.solution.response**2 * explained.inputs.variances_rad2_s2
     dof = np.broadcast_to(explained.inputs.noise_dof, variances.shape)
     parts, dofs = (array.reshape(len(variances), -1).T for array in (variances, dof))

@@ -47,9 +47,11 @@ class CommonErrors:
 
 @dataclass(frozen=True, slots=True)
 class Prediction:
-    """The common errors by the last F, their patterns (P, N, 3), and the gain (P, N, 3) from the means to their sizes.
+    """The common errors predicted with the last estimate of F, and the arrays from which they follow.
 
-    `speed_noise_rad_s` (N, 3): the effect on the readings of one standard deviation of each speed.
+    - `patterns_rad_s` (P, N, 3): the effect of one standard deviation of each error on the readings.
+    - `gain` (P, N, 3): the map from the means to the sizes of the errors.
+    - `speed_noise_rad_s` (N, 3): the effect on the readings of one standard deviation of each speed.
     """
 
     errors: CommonErrors
@@ -80,7 +82,7 @@ class CommonErrorModel:
         return design_matrix(self.rates_rad_s, self.gravity_m_s2)
 
     def predict(self, shared_covariance_rad2_s2: Array | None = None) -> Prediction:
-        """Return the errors that the means determine. Raise Fault as `solve_vector_model` does."""
+        """Return the prediction of the common errors from the means. Raise Fault as `solve_vector_model` does."""
         check_observations(
             self.design, self.means_rad_s, self.rates_rad_s, self.variances_rad2_s2, self.speed_std_rad_s
         )

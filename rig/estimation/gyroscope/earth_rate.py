@@ -2,13 +2,13 @@
 
     m = F (ω + R ω_E) + c (+ G a) + B e
 
-R maps the arm's base frame to the flange's, ω_E (3,) is the Earth's rate in the base frame; F, c, G, e as in
-`rig.estimation.gyroscope.vector_fit`. Rests in many attitudes separate the bias from rates that turn with the flange.
-So does a sweep: in the mean of a revolution only the Earth's rate along its axis remains. In all, 15 parameters are
+R maps the arm's base frame to the flange's, ω_E (3,) is the Earth's rate in the base frame; the other symbols are those
+of `rig.estimation.gyroscope.common_errors`. Rests in many attitudes separate the bias from rates fixed in the room. So
+does a sweep: in the mean of a revolution only the Earth's rate along its axis remains. In all, 15 parameters are
 estimated: F, c and ω_E.
 
-e contains the arm's errors: its angles, as in `explain`, and its repeatability, which tilts the axis of each sweep
-independently. A tilt of a hundred microradians at 1 rad/s causes an error of 20 °/h perpendicular to the axis, and an
+e contains the errors of the arm's angles, as in `vector_fit.explain`, and of its repeatability, which tilts the axis of
+each sweep independently. A tilt of a hundred microradians at 1 rad/s causes an error of 20 °/h across the axis, and an
 error in a revolution's end time changes the speed along the axis. So sweeps contribute little more than the bias, and
 the rests in many attitudes determine the Earth's rate.
 
@@ -65,7 +65,7 @@ class EarthRatePrior:
 class EarthRate:
     """The estimated Earth's rate: `rate_rad_s` (3,) in the frame of the arm's base, `covariance_rad2_s2` (3, 3).
 
-    `up` (3,) is upwards there; `vertical_fixed` is True if the vertical component was fixed by the latitude.
+    `up` (3,) points upwards in that frame; `vertical_fixed` is True if the latitude fixed the vertical component.
     `birge_ratio` is the RMS ratio of residuals to their expected standard deviation, with `dof` degrees of freedom;
     above 1 it multiplies the standard deviations.
     """
@@ -174,7 +174,7 @@ class _EarthRateFit:
 def _fit(
     inputs: VectorInputs, mounting: Array, directions: Array, gravity: Array | None, prior: EarthRatePrior
 ) -> _EarthRateFit:
-    """Fit F, c, G, the arm's errors and the Earth's rate along `directions` (d, 3) of the base, in this order."""
+    """Return the fit of F, c, G and common errors; the last d errors are the Earth's rate along `directions` (d, 3)."""
     speeds = np.linalg.norm(inputs.turns_rad_s, axis=1)
     durations = np.diff(inputs.windows_s).T[0]
     by_states = np.sqrt(2) * prior.state_jitter_s * inputs.state_gains / durations * speeds

@@ -15,7 +15,7 @@ oscillation with n readings per period is underestimated by (2π/n)⁴/720: 5e-6
 
 A small error of the parameters δθ = (δF row by row, δb) adds δω = −F⁻¹ (δF ω + δb) to the rate and rotates C:
 
-    exp(S(t) δθ) C(t),   S(t) = −∫ C F⁻¹ [ω ⊗ 1, 1] dt        in coordinates of the first reading
+    exp(S(t) δθ) C(t),   S(t) = −∫ C F⁻¹ [ω ⊗ I, I] dt        in coordinates of the first reading
 
 so one pass gives C and S at all requested instants. The increment from t₁ to t₂ is then the rotation C(t₁)ᵀ C(t₂), with
 the sensitivity C(t₁)ᵀ (S(t₂) − S(t₁)) in body coordinates at t₁.
@@ -175,14 +175,15 @@ class _IncrementSteps:
     durations_s: Array
 
     def differentiate(self, inverse: Array) -> Array:
-        """Return the rotation (k, 3, 3) per unit of integrated error of the readings, in body coordinates at the start.
+        """Return the derivatives (k, 3, 3) of the steps' rotations by the integrated error of the readings.
 
-        The attitude half-way stands for the whole step, with an error of about φ²/24.
+        The rotation is in body coordinates at the start. The attitude half-way is used for the whole step, which causes
+        an error of about φ²/24.
         """
         return np.asarray(-_matrices(self.vectors / 2) @ inverse, dtype=np.float64)
 
     def sensitivities(self, attitudes: Array, inverse: Array) -> Array:
-        """Return S (k, 3, 12) of each step, which starts at its element of `attitudes` (k, 3, 3)."""
+        """Return the contribution (k, 3, 12) of each step to S; the steps start at `attitudes` (k, 3, 3)."""
         per_rate_error = (attitudes @ self.differentiate(inverse))[..., None]
         per_matrix = (per_rate_error * self.integrals_rad[:, None, None, :]).reshape(-1, 3, 9)
         return np.concatenate([per_matrix, per_rate_error[..., 0] * self.durations_s[..., None]], axis=2)

@@ -46,12 +46,13 @@ def solve_levenberg_marquardt(
     speed_std_rad_s: ArrayLike | None = None,
     weighted: bool = True,
 ) -> LevenbergMarquardtSolution:
-    """Solve by `scipy.optimize.least_squares(method="lm")` with the exact Jacobian.
+    """Return the solution of `scipy.optimize.least_squares(method="lm")` with the exact Jacobian.
 
     The start has unit scale factors, and the negative mean of the readings as bias.
 
     `means_rad_s`, `variances_rad2_s2` (N, 3): mean readings of N ≥ 6 sweeps and the variances of these means;
-    `speeds_rad_s`, `speed_std_rad_s` (N,). Weights are inverse variances of ‖m + b‖²; the paper SIX has equal weights.
+    `speeds_rad_s`, `speed_std_rad_s` (N,). If `weighted`, the weights are the inverse variances of the residuals for
+    unit scale factors; otherwise they are equal, as in the paper SIX.
 
     Raise Fault `too_few_observations`, `not_finite`, `bad_variance`, `bad_speed`, `zero_reading`,
     `duplicated_observation`, `lm_did_not_converge`, `rank_deficient`, `ill_conditioned`, `wrong_unit`,

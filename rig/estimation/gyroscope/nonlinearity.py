@@ -49,8 +49,8 @@ def curvature(matrix: Array, rates_rad_s: Array) -> Array:
 def nonlinear_effects(matrix: Array, rates_rad_s: Array, full_scale_rad_s: float, true_at_rad_s: float = 0.0) -> Array:
     """Return the effects (6, N, 3) of cubes along x, y, z, then of squares, each of unit size at full scale.
 
-    Arguments as in `curvature`. A linear term is subtracted from the cubes, so that F is exact at the speed
-    `true_at_rad_s`, that is, the cubes have no effect there.
+    The first two arguments are those of `curvature`. A linear term is subtracted from the cubes, so that they have no
+    effect at the speed `true_at_rad_s`, to which F then refers.
     """
     readings = rates_rad_s @ matrix.T
     projected = readings / np.linalg.norm(matrix, axis=1) / full_scale_rad_s

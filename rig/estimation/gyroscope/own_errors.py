@@ -83,7 +83,7 @@ def list_own_errors(
 
 
 def rounding_errors(means_rad_s: Array, roundings_rad_s: Array | float, variances_rad2_s2: Array) -> Iterator[OwnError]:
-    """Yield the rounding errors that means (N, 3) share, from the standard uncertainties (N, 3) of rounding them.
+    """Yield the rounding errors that means (N, 3) share; `roundings_rad_s` are the standard uncertainties of rounding.
 
     Means that differ by less than a step, such as those of all rests, share one error, which averaging does not reduce.
     The variances (N, 3) contain the independent part of rounding. Negligible errors are omitted.
@@ -112,9 +112,9 @@ def _temperature_deviations_k(sensor: SensorProperties, windows_s: Array, weight
 
 
 def unseen_k(step_k: float, windows_s: Array, weights: Array) -> Array:
-    """Return the temperature changes (N,), K, of a linear drift by `step_k` in all, which the thermometer hides.
+    """Return the temperature deviations (N,), K, in a linear drift that the thermometer hides.
 
-    The changes are relative to the mean over the windows (N, 2) with weights (N,).
+    The drift is `step_k` from the first window to the last; the deviations are from the mean with `weights` (N,).
     """
     middle = windows_s.mean(axis=1)
     return np.asarray(step_k * subtract_mean(middle, weights) / np.ptp(middle), dtype=np.float64)

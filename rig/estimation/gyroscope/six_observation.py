@@ -1,7 +1,8 @@
 """Scale factors and biases of a triaxial gyroscope from averaged revolutions: the equations of the paper SIX.
 
-Model: g = K (m + b), K = diag(k), b in rad/s of the reading. The paper prints g = K m + b as Eq. (1), but its Eqs. (3),
-(4) and Algorithm 1 agree with the model here. Each revolution gives one equation ‖g‖² = ω², Eq. (4):
+The model is g = K (m + b) for the rate g and the reading m, with K = diag(k) and b in rad/s of the reading. The paper
+prints g = K m + b as Eq. (1), but its Eqs. (3), (4) and Algorithm 1 agree with the model here. Each revolution gives
+one equation ‖g‖² = ω², Eq. (4):
 
     ω² = β0 + x β,   x = [mx² my² mz² mx my mz],   β = [k² …, 2 k² b …],   β0 = Σ k² b² = Σ β_l² / (4 β_s)
 
@@ -11,8 +12,8 @@ the noise's variance to every square and shrinks the scale.
 
 β0 is unknown too. If it has the value γ, least squares give β(γ) = p − γ q with p = X⁺ω² and q = X⁺1 (X⁺: pseudoinverse
 of X, 1: column of ones). With Γ(β) = Σ β_l² / (4 β_s) the solution is the γ that satisfies γ = Γ(β(γ)). Two functions
-find it: `solve_by_newton`, and `solve_by_algorithm_1` as published in SIX.
-`rig.estimation.gyroscope.accumulator` computes p and q from any number of revolutions.
+find it: `solve_by_newton`, and `solve_by_algorithm_1` as published in SIX. `rig.estimation.gyroscope.accumulator`
+computes p and q from any number of revolutions.
 """
 
 import numpy as np

@@ -1,7 +1,7 @@
 """Six-observation estimates of many runs at once, for studies: the equations of `six_observation`, vectorised.
 
-Runs are along the first axis. A run without a solution is NaN and not marked as converged. `Accumulator.solve` solves
-one run and raises named faults.
+Runs are along the first axis. If a run has no solution, its values are NaN and it is not marked as converged.
+`Accumulator.solve` solves one run and raises named faults.
 """
 
 from dataclasses import dataclass
@@ -24,9 +24,10 @@ class BatchSolution:
 
 
 def newton_batch(means_rad_s: ArrayLike, speeds_rad_s: ArrayLike) -> BatchSolution:
-    """Solve every run by the closed form, followed by Newton steps on γ if speeds differ, as `solve_by_newton` does.
+    """Return the solutions of all runs: the closed form, then Newton steps on γ if speeds differ (`solve_by_newton`).
 
-    The linear solution β = p − γ q depends on the unknown γ = Σ k² b². Means (R, N, 3); speeds (N,) or (R, N).
+    The linear solution β = p − γ q depends on the unknown γ = Σ k² b². The means are (R, N, 3), the speeds (N,) or (R,
+    N).
     """
     means = np.asarray(means_rad_s, dtype=np.float64)
     centre = means.mean(axis=1)
@@ -52,9 +53,9 @@ def newton_batch(means_rad_s: ArrayLike, speeds_rad_s: ArrayLike) -> BatchSoluti
 
 
 def algorithm_1_batch(means_rad_s: ArrayLike, speeds_rad_s: ArrayLike) -> BatchSolution:
-    """Solve every run by the paper's Algorithm 1, as published; `iterations` counts as `solve_by_algorithm_1` does.
+    """Return the solutions of all runs by the paper's Algorithm 1; passes count as in `solve_by_algorithm_1`.
 
-    `means_rad_s` (R, N, 3); `speeds_rad_s` (N,) or (R, N).
+    The means are (R, N, 3), the speeds (N,) or (R, N).
     """
     means = np.asarray(means_rad_s, dtype=np.float64)
     p, q, _ = _responses(means, speeds_rad_s)

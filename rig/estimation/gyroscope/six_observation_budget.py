@@ -29,7 +29,7 @@ AXIS_ANGLES = "angles between the axes"
 def six_observation_budget(explained: VectorFit, six: Solution, unknown: UnknownErrors, axes_rad: float) -> Budget:
     """Return the budget of the solution `six`, which uses only the sweeps of `explained`, weighted by their noise.
 
-    `axes_rad` is the half-width of the angles between the sensor's axes about 90°.
+    `axes_rad` is the half-width of the deviations from 90° of the angles between the sensor's axes.
     """
     inputs, solution = explained.inputs, explained.solution
     response = response_of(six, inputs)
@@ -62,8 +62,8 @@ def six_observation_budget(explained: VectorFit, six: Solution, unknown: Unknown
 def response_of(solution: Solution, inputs: VectorInputs) -> Array:
     """Return the derivative (6, N, 3) of scale and bias with respect to the mean readings; zero for the unused rests.
 
-    The first order is that of `Accumulator._covariance`. An error δm of a mean reading m adds the error
-    e = −2 Σ_j k_j² (m_j + b_j) δm_j to its equation.
+    An error δm of a mean reading m adds the error e = −2 Σ_j k_j² (m_j + b_j) δm_j to the equation of its sweep, which
+    changes the solution as in `Accumulator._covariance`.
     """
     swept = np.linalg.norm(inputs.turns_rad_s, axis=1) > 0
     means, variances = inputs.means_rad_s[swept], inputs.variances_rad2_s2[swept]

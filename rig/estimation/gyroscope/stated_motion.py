@@ -1,14 +1,15 @@
 """Random errors of the stated motion of sweeps, estimated from their residuals.
 
-    m_j = F ω_j + c + F (ω̂_j ω̂_jᵀ ε_j + (1 − ω̂_j ω̂_jᵀ) η_j) ‖ω_j‖ + noise,   ε_j ~ N(0, ρ²), η_j ~ N(0, α² 1₃)
+    m_j = F ω_j + c + F (ω̂_j ε_j + (I − ω̂_j ω̂_jᵀ) η_j) ‖ω_j‖ + noise,   ε_j ~ N(0, ρ²), η_j ~ N(0, α² I)
 
-ρ is the relative error of a sweep's rate, α the tilt of its axis: random effects of unknown variance. Few sweeps
-determine a variance badly: the restricted maximum likelihood estimate is often zero, and a U computed from it covers
-the true value in only 60 to 85 of 100 cases. So the result averages over all pairs (ρ, α), weighted by the restricted
-likelihood (Harville, J. Am. Stat. Assoc. 72 (1977) 320) and a prior. The prior is log-uniform from a tenth of the
-noise, below which ρ and α change nothing, to `PRIOR_KNEE_ERROR`; above this, its density over ln ρ falls as 1/ρ, and
-that over ln α as 1/α. If the sweeps determine ρ and α, U approaches that of Student's t with the dof of the redundant
-sweeps (Box and Tiao, Bayesian Inference in Statistical Analysis, 1973, 5.2; Gelman, Bayesian Analysis 1 (2006) 515).
+ω_j is the stated rate of sweep j and ω̂_j its unit vector. ε_j is the relative error of the rate and η_j the tilt of
+the axis; their standard deviations ρ and α are unknown. Few sweeps determine a variance badly: the restricted maximum
+likelihood estimate is often zero, and a U computed from it covers the true value in only 60 to 85 of 100 cases. So the
+result averages over all pairs (ρ, α), weighted by the restricted likelihood (Harville, J. Am. Stat. Assoc. 72 (1977)
+320) and a prior. The prior is log-uniform from a tenth of the noise, below which ρ and α change nothing, to
+`PRIOR_KNEE_ERROR`; above this, its density over ln ρ falls as 1/ρ, and that over ln α as 1/α. If the sweeps determine ρ
+and α, U approaches that of Student's t with the dof of the redundant sweeps (Box and Tiao, Bayesian Inference in
+Statistical Analysis, 1973, 5.2; Gelman, Bayesian Analysis 1 (2006) 515).
 """
 
 from dataclasses import dataclass
@@ -51,7 +52,7 @@ class StatedMotion:
 
     @property
     def relative_noise(self) -> float:
-        """The noise of a sweep's mean as a fraction of its rate, the median of all sweeps."""
+        """The median over all sweeps of the noise of a sweep's mean as a fraction of its rate."""
         sizes = np.linalg.norm(self.rate_patterns, axis=1)
         swept = sizes > 0
         noise = np.sqrt(self.variances_rad2_s2.mean(axis=1))

@@ -171,7 +171,7 @@ def centripetal_m_s2(turns_rad_s: Array, lever_arm_m: Array) -> Array:
 
 
 def explain(inputs: VectorInputs, nominal_mounting: Array, process: BiasProcess | None = None) -> VectorFit:
-    """Estimate scale, bias and mounting, and the g-sensitivity if the attitudes determine it.
+    """Return the fit of scale, bias and mounting, and of the g-sensitivity if the attitudes determine it.
 
     The bias drift is estimated from the means unless a `process` is given. Raise Fault as the vector model does.
     """
@@ -190,7 +190,7 @@ def explain(inputs: VectorInputs, nominal_mounting: Array, process: BiasProcess 
 def _explain(
     inputs: VectorInputs, mounting: Array, gravity_m_s2: Array | None, process: BiasProcess | None
 ) -> VectorFit:
-    """Solve with a steady bias, take `process` or estimate it from the residuals, and solve again if it drifts."""
+    """Return the fit with the bias drift `process`, which is estimated from the residuals of a steady bias if None."""
     several = len(inputs.speeds_rad_s) > 1
     arm_errors = inputs.arm_errors_rad_s
 

@@ -3,13 +3,13 @@
     m = F ω + c (+ G a),   F_i = a_i / k_i,   c = −b
 
 m is the mean reading (rad/s), ω the mean angular rate in the flange frame (unit axis × speed, zero for a rest), a_i the
-unit vector of sensor axis i in the flange frame. It is the model g = K (m + b) of the paper SIX with a known direction
-of g: k_i = 1 / ‖row i of F‖ and b = −c, so every sweep and every rest determines all three biases. The mounting
-rotation and the non-orthogonality of the axes are estimated, not assumed. If the apparent gravity a in the flange
-frame (m/s²) is given, G (3×3, rad/s per m/s²) is the g-sensitivity.
+unit vector of sensor axis i in the flange frame. It is the model of the paper SIX, rate = K (m + b), with a rate of
+known direction: k_i = 1 / ‖row i of F‖ and b = −c, so every sweep and every rest determines all three biases. The
+mounting rotation and the non-orthogonality of the axes are estimated, not assumed. If the apparent gravity a in the
+flange frame (m/s²) is given, G (3×3, rad/s per m/s²) is the g-sensitivity.
 
-The equations are linear in F, c and G, one weighted regression for each axis (Aitken's generalised least squares):
-efficient if the noise is Gaussian.
+The equations are linear in F, c and G. Each axis has a weighted regression (Aitken's generalised least squares), which
+is efficient if the noise is Gaussian.
 """
 
 from dataclasses import dataclass
@@ -45,7 +45,7 @@ REMEDY = "Sweep about three different axes, and turn the flange against gravity 
 
 @dataclass(frozen=True, slots=True)
 class VectorSolution:
-    """A gyroscope's calibration by the vector model g = K (m + b), with its covariance.
+    """A gyroscope's calibration by the vector model, rate = K (reading + b), with its covariance.
 
     - scale, bias_rad_s (3,): the diagonal of K, and b.
     - covariance (6, 6): in the order kx ky kz bx by bz.
@@ -61,7 +61,7 @@ class VectorSolution:
     - residuals_rad_s (N, 3): readings minus model.
     - rank: rank of the scaled design.
     - condition: condition number of the design's part for axes and bias, without gravity.
-    - observations, iterations: number of mean readings, and of solutions.
+    - observations, iterations: number of mean readings, and number of times that the equations were solved.
     - warnings: sentences for people.
     - estimator: the estimator's name.
     """
@@ -184,9 +184,9 @@ def check_observations(
 def fit_coefficients(
     design: Array, means: Array, rates: Array, variances: Array, *, speed_std: Array, shared: Array | None
 ) -> tuple[Array, Array, Array | None]:
-    """Return coefficients and map as `regress` does, with the errors of speeds in the weights, and these (N, 3).
+    """Return the coefficients and the map of `regress`, and the effect (N, 3) of the speeds' errors on the readings.
 
-    If all speeds are exact, they have no errors: None.
+    The weights include this effect. It is None if all speeds are exact.
     """
     coefficients, inverse = regress(design, means, variances, shared)
     if not speed_std.any():
@@ -206,7 +206,7 @@ def check_matrix(matrix: Array, nominal_mounting: Array | None) -> SensorAxes:
 
 
 def solve_vector_batch(means_rad_s: ArrayLike, rates_rad_s: ArrayLike, variances_rad2_s2: ArrayLike) -> VectorBatch:
-    """Solve the vector model of many runs at once, without checks, for studies of a design known to be identifiable.
+    """Return the vector model of R runs, solved at once and without checks, for studies of a design without defects.
 
     `means_rad_s` (R, N, 3); `rates_rad_s` (N, 3) or (R, N, 3); `variances_rad2_s2` (N, 3), the same for all runs.
     """
