@@ -2,8 +2,8 @@
 
     a_m = F (s + F̄ s²) + b,   s = −Rᵀ g
 
-s is the specific force: at rest the opposite of gravity. Eq. (10) writes g for s, Eq. (11) −Rᵀ g in the first-order
-term; in the second-order term the sign does not matter. F̄ = diag(φ).
+s is the specific force, which at rest is the opposite of gravity, R the attitude and F̄ = diag(φ). Eq. (10) writes g
+for s. Eq. (11) writes −Rᵀ g in the first-order term; in the second-order term the sign does not matter.
 """
 
 import numpy as np

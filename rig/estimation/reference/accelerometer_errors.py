@@ -47,7 +47,7 @@ class AccelerometerErrors:
     turning_m_s2: float = 0.0
 
     def omit(self, segment: int) -> "AccelerometerErrors":
-        """Return the errors without one dwell's or sweep's own errors; `segment` is its index."""
+        """Return the errors without the records of the dwell or sweep of index `segment`."""
         remaining = np.arange(len(self.warmer_k)) != segment
         return replace(
             self,

@@ -3,16 +3,16 @@
     m = F (s + φ s²) + b,   s = Rᵀ v_ref + ω × (ω × (p + r)) + α × (p + r)
 
 in flange coordinates; F includes the mounting, φ is the nonlinearity, b the bias, ω the angular rate, α the angular
-acceleration. v_ref is the specific force at rest, in base coordinates. The lever arm p, from the rotation axis to the
-flange, is given by the arm; r leads from the flange to the sensor.
+acceleration. v_ref is the specific force at rest, in base coordinates, and R the rotation from flange to base. The
+lever arm p, from the rotation axis to the flange, is given by the arm; r leads from the flange to the sensor.
 
 If a joint turns by θ about the flange-fixed axis a, from the attitude R₀, at the constant rate ω, the specific force
-has a mean, a cosine and a sine over its angle. With u = R₀ᵀ v_ref and c = ω² (a aᵀ − 1) (p + r):
+has a mean, a cosine and a sine over its angle. With u = R₀ᵀ v_ref and c = ω² (a aᵀ − I) (p + r):
 
     mean: a (a·u) + c,   cosine: cos ψ (u − a (a·u)) + sin ψ a × u,   sine: sin ψ (u − a (a·u)) − cos ψ a × u
 
 A joint turns unevenly. The weights that form mean, cosine and sine of the readings are also applied to ω² and α of the
-encoders (`Sweeps.turning_rad2_s2`). Each of the three then contains c = ω² (a aᵀ − 1) (p + r) + α a × (p + r), with
+encoders (`Sweeps.turning_rad2_s2`). Each of the three then contains c = ω² (a aᵀ − I) (p + r) + α a × (p + r), with
 these weighted ω² and α. In uneven rotation, ω² and α are those of the time τ earlier, and gravity is rotated by a
 further (ω − ω₀) τ, with the mean rate ω₀.
 
@@ -100,12 +100,12 @@ NO_SWEEPS = Sweeps(
 
 @dataclass(frozen=True, slots=True)
 class Movement:
-    """Dwells and sweeps together.
+    """Dwells and sweeps together; δ is the standard deviation of the arm's attitude errors.
 
     - `repeatability_rad`: std of each sweep's independent rotations; the sweeps of one station share all other errors.
     - `sensor_errors`: errors of the sensor itself; None if unknown.
     - `arm_turns` (P, 3 N + 10 M): small rotations of N dwells and waves of M sweeps, in the order of the columns of
-      `effects`, due to P constant errors of the arm, for δ = 1; None if unknown.
+      `effects`, due to P constant errors of the arm, for δ = 1 rad; None if unknown.
     - `independent_fraction`: the fraction of δ² that is independent in each dwell.
     """
 
@@ -271,7 +271,7 @@ def split_effects(theta: Array, movement: Movement) -> tuple[Array, Array | None
 
 
 def combine_effects(independent: Array, constant: Array | None, fraction: float) -> Array:
-    """Return the columns (3 K, P) of the arm's errors, with a fraction of δ² independent and the rest constant."""
+    """Return the columns (3 K, P) of the arm's errors; a `fraction` of their variance is of the independent ones."""
     if constant is None:
         return independent
     return np.concatenate([np.sqrt(fraction) * independent, np.sqrt(1 - fraction) * constant], axis=1)
@@ -299,7 +299,7 @@ def _differentiate_angle(apparent: Array, theta: Array, sweeps: Sweeps) -> Array
     """Return the harmonics (3 M, 3, 4) of the specific force due to angle errors w: cos θ, sin θ, cos 2θ, sin 2θ.
 
     Gravity `apparent` changes by w times the derivative of its first harmonic. The rate grows by ω w′, so the first two
-    errors also add the first harmonics of the centripetal acceleration 2 ω² w′ (a aᵀ − 1) (p + r) and the Euler
+    errors also add the first harmonics of the centripetal acceleration 2 ω² w′ (a aᵀ − I) (p + r) and the Euler
     acceleration ω² w″ a × (p + r). The effect of the delay on these is neglected.
     """
     axes, arms, squares = sweeps.axes_flange, sweeps.arms_m + theta[LEVER], sweeps.speeds_rad_s[:, None] ** 2

@@ -112,11 +112,11 @@ def solve_imu(
     arm_turns: Array | None = None,
     independent_fractions: Sequence[float] = (INDEPENDENT_FRACTION,),
 ) -> ImuSolution:
-    """Calibrate from dwells, sweeps or both.
+    """Return the calibration of an accelerometer from dwells, sweeps or both.
 
-    `gravity_m_s2` is the length of the specific force at rest, v_ref, whose product with `up` (3,) is positive, both in
-    the base frame. `repeatability_rad`, `sensor_errors`, `arm_turns`: see `Movement`. `independent_fractions` are the
-    possible values of `Movement.independent_fraction`, from which the readings determine it.
+    v_ref, the specific force at rest in the base frame, has the length `gravity_m_s2` and a positive product with `up`
+    (3,). `Movement` explains `repeatability_rad`, `sensor_errors` and `arm_turns`. `independent_fractions` are possible
+    values of `Movement.independent_fraction`; the readings select one of them.
 
     Raise Fault `too_few_observations`, `not_finite`, `bad_variance`, `bad_speed`, `zero_reading`,
     `duplicated_observation`, `bad_attitude`, `rank_deficient`, `ill_conditioned`, `sign_unknown`, `wrong_unit`,

@@ -55,7 +55,7 @@ def uniformity(
     variances_t2: ArrayLike,
     attitude_error_rad: float,
 ) -> Uniformity:
-    """Test that the field is uniform, by the residuals of a fit of the readings with the given error of the attitudes.
+    """Return the test that the field is uniform: χ² of a fit of the readings that assumes the given error of attitudes.
 
     `solution` fits the `readings_t` with `variances_t2` (N, 3) in `attitudes` (N, 3, 3). Raise Fault
     `attitude_untrustworthy` if no fit exists.

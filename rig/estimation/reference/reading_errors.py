@@ -107,12 +107,12 @@ def find_drift_covariance(movement: Movement) -> Array:
 
 
 def unit_walk(sensor: AccelerometerErrors, movement: Movement) -> Array:
-    """Return the covariance (3 K, 3 K) of a random walk of each axis, 1 m/s² (std) after one second."""
+    """Return the covariance (3 K, 3 K) of a random walk of each axis' bias whose std after one second is 1 m/s²."""
     return _expand_bias(walk_covariance(sensor.windows_s), movement)
 
 
 def _expand_bias(covariance: Array, movement: Movement) -> Array:
-    """Return the covariance (3 K, 3 K) of readings due to biases of `covariance` (N + M, N + M), axes independent."""
+    """Return the covariance (3 K, 3 K) of readings due to biases of `covariance` (N + M, N + M) on each axis alone."""
     steady = movement.constant() > 0
     expanded = np.zeros((len(steady),) * 2)
     expanded[np.ix_(steady, steady)] = covariance

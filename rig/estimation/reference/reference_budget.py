@@ -1,4 +1,4 @@
-"""The uncertainty budget of a sensor calibrated in a constant reference of given norm: gravity, a field.
+"""The uncertainty budget of a sensor calibrated in a constant reference of given norm, such as gravity or a field.
 
 The readings determine their noise and the error of the arm's attitudes. They do not determine the error of the
 reference's norm, the attenuation of the sensor's filter and the drift of the reference. The solution's response
@@ -46,7 +46,7 @@ class FitUncertainty:
 
     @property
     def noise_dof_min(self) -> float:
-        """The smallest of the degrees of freedom of scale and bias, (6,), for noise alone."""
+        """The smallest of the six degrees of freedom of scale and bias for noise alone."""
         return fewest_dof(self.response, np.diag(self.noise), self.noise_dof)
 
     def covariance_of(self, patterns: Array) -> Array:
@@ -74,7 +74,7 @@ class NormUncertainty:
 def scale_and_bias(matrix: Array, scale: Array, parameters: int) -> Array:
     """Return the derivative (6, p) of scale and bias with respect to θ (p,), which begins with F, the reference and b.
 
-    The bias changes its sign: in θ it is a part of the reading, in a gyroscope's result it is added to the reading.
+    The bias changes its sign, because in θ it is a part of the reading, but in a result it is added to the reading.
     """
     derivative = np.zeros((6, parameters))
     derivative[:, np.r_[F, BIAS]] = parameter_jacobian(matrix, scale) * np.repeat([1.0, -1.0], 3)[:, None]
@@ -89,7 +89,7 @@ def scale_and_bias_covariance(matrix: Array, scale: Array, covariance: Array) ->
 
 
 def fewest_dof(response: Array, variances: Array, dof: Array) -> float:
-    """Return the smallest of the degrees of freedom of scale and bias, (6,), for noise alone.
+    """Return the smallest of the six degrees of freedom of scale and bias for noise alone.
 
     `response` (6, n) contains the derivatives of scale and bias with respect to the readings, whose noise has the
     `variances` (n,), with `dof` (n,) degrees of freedom.
@@ -109,7 +109,7 @@ def response_in_attitudes(solution: TriaxialSolution, dwells: Dwells) -> Array:
 
 
 def reference_budget(spread: FitUncertainty, size: NormUncertainty, others: Sequence[Contributor] = ()) -> Budget:
-    """Return the budget of a fit's uncertainty `spread`, the norm's uncertainty `size`, and `others`."""
+    """Return the budget with the contributors of a fit's uncertainty and of the norm's, and with `others`."""
     noise = spread.response @ spread.noise @ spread.response.T
     contributors = [
         evaluate_a(NOISE, "scatter of the readings", noise, spread.noise_dof_min),
@@ -147,7 +147,7 @@ def _evaluate_norm(scale: Array, size: NormUncertainty) -> Contributor:
 
 
 def find_uncertainty_dof(error: AttitudeError) -> float:
-    """Return the degrees of freedom of an estimated attitude error, by its uncertainty (JCGM 100, G.4.2)."""
+    """Return the degrees of freedom of an estimated attitude error, from its own uncertainty (JCGM 100, G.4.2)."""
     if error.uncertainty_rad == 0.0:
         return np.inf
     return max(1.0, 0.5 * (error.std_rad / error.uncertainty_rad) ** 2)

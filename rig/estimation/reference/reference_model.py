@@ -7,7 +7,7 @@ numbers. The least-squares fit weighted by the readings' variances is the maximu
 reaches it from the paper's estimate in a few steps. With v̄ = 0, F and v_ref are identifiable only up to a common
 factor, so ‖v_ref‖ is fixed.
 
-The covariance V of readings is given as whiteners W (…, N, 3, 3) with W V Wᵀ = 1: `whitening`.
+The covariance V of readings is given as whiteners W (…, N, 3, 3) with W V Wᵀ = I, as `whitening` returns them.
 
 All functions broadcast over runs: readings (…, N, 3), θ (…, 15 or 18).
 """

@@ -8,7 +8,7 @@ with it; the field a of its carrier (the part of the arm's iron that rotates wit
 b_k is the bias estimated in run k and F_k the matrix estimated with it, which includes the real mounting. With half a
 revolution about one axis, on the other two axes b is half the sum and the field half the difference; along the axis
 only the sum is identifiable. Half a revolution about another axis separates all three. a includes the field of the
-arm's other links, the same to first order in all runs with the same attitudes.
+arm's other links, which to first order is the same in all runs with the same attitudes.
 """
 
 from dataclasses import dataclass
@@ -40,7 +40,7 @@ class Reversal:
 
 
 def separate(biases_t: Array, covariances_t2: Array, matrices: Array, mountings: Array) -> Reversal:
-    """Separate the sensor's own bias from the arm's field by K ≥ 2 runs with the sensor in different mountings.
+    """Return the sensor's own bias and the arm's field, which K ≥ 2 runs with different mountings separate.
 
     Each run has a bias (K, 3) with its covariance (K, 3, 3), a matrix F (K, 3, 3), and a mounting M (K, 3, 3). Raise
     Refused `mounting_not_turned` if all mountings are equal, Fault `reversal_contradicts` if runs disagree.

@@ -1,8 +1,8 @@
 """Readings with given noise, and shared errors of one unknown standard deviation.
 
-    y = J x + E e + n,   n ~ N(0, V),   e ~ N(0, δ² 1)
+    y = J x + E e + n,   n ~ N(0, V),   e ~ N(0, δ² I)
 
-J is the Jacobian of the readings y, the effects E map unit errors to readings. In coordinates in which V is 1 and E Eᵀ
+J is the Jacobian of the readings y, the effects E map unit errors to readings. In coordinates in which V is I and E Eᵀ
 is diagonal, with the elements γ (`growth`), the readings are independent with variances 1 + δ² γ for any δ. δ is
 estimated by restricted maximum likelihood (Patterson and Thompson, Biometrika 58 (1971) 545).
 """
@@ -28,7 +28,10 @@ class Decorrelation:
 
 
 def decorrelate(noise: Array, effects: Array) -> Decorrelation:
-    """Return the decorrelation of readings for V `noise` (n, n) and E `effects`. Raise LinAlgError for an invalid V."""
+    """Return the decorrelation of readings with the covariance `noise` (n, n) and the `effects` E (n, P) of the errors.
+
+    Raise LinAlgError for an invalid covariance.
+    """
     whitener = np.asarray(np.linalg.inv(np.linalg.cholesky(noise)), dtype=np.float64)
     scaled = whitener @ effects
     growth, directions = np.linalg.eigh(scaled @ scaled.T)

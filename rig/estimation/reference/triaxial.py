@@ -111,7 +111,7 @@ def solve_triaxial(
     method: Method = "as_published",
     attitude_std_rad: ArrayLike | None = None,
 ) -> TriaxialSolution:
-    """Solve for F, v_ref and b, and φ with `second_order`.
+    """Return F, v_ref and b, and with `second_order` also φ.
 
     - `readings`, `variances` (N, 3): mean readings and the variances of these means.
     - `attitudes` (N, 3, 3): R, body to table.
