@@ -3,10 +3,10 @@
     σ²(τ) = ⟨(ȳ_{k+m} − ȳ_k)²⟩ / 2,   τ = m τ₀
 
 over all overlapping pairs of adjacent means ȳ of m readings (NIST SP 1065, section 5.2.4, with readings instead of
-frequencies). A pair lies within one interval of readings, because the sensor may have turned between two.
+frequencies). A pair lies within one interval of readings, because the sensor may have turned between two intervals.
 
 The equivalent degrees of freedom of σ² (Howe, Allan and Barnes 1981; NIST SP 1065, table 5) are those of the noise that
-dominates about τ, by the slope of the curve. σ² times these degrees of freedom, divided by its true value, is
+dominates near τ, according to the slope of the curve. σ² times these degrees of freedom, divided by its true value, is
 distributed as χ². White noise has the slope −1/2 and σ = N/√τ, N being the random walk; the least σ, at the flat part
 of the curve, is 0.664 times the bias instability B (IEEE Std 952-1997, C.1.1 and C.1.3).
 """
@@ -70,7 +70,7 @@ class AllanReading:
 class AllanAxis:
     """The noise of one axis: random walk N in the readings' unit times √s, and bias instability B in their unit.
 
-    Instead of either, there may be the Fault that prevents its determination.
+    A value that the curve does not determine is replaced by the Fault that says why.
     """
 
     random_walk: AllanReading | Fault

@@ -3,7 +3,7 @@
 The readings are averaged over windows. A random walk of rate q (rad/s per √s) changes the bias more the longer the time
 between two windows; a scatter s has no memory; flicker noise is in between. The size of the flicker is given, because a
 few averages do not determine it. q and s are estimated from the averages by restricted maximum likelihood (Patterson
-and Thompson, Biometrika 58 (1971) 545), the likelihood of the contrasts that do not depend on the fitted parameters.
+and Thompson, Biometrika 58 (1971) 545), that is, from contrasts that do not depend on the fitted parameters.
 """
 
 from collections.abc import Callable
@@ -48,7 +48,7 @@ class BiasProcess:
         return not self.is_drifting and self.instability_rad_s == 0.0
 
     def covariance(self, windows_s: ArrayLike) -> Array:
-        """Return the covariance (N, N) of the drift's means over windows (N, 2), relative to its mean over all time."""
+        """Return the covariance (N, N) of the drift's means over windows (N, 2), relative to the mean over all time."""
         walk = self.walk_rad_s_sqrt_s**2 * walk_covariance(windows_s)
         drift: Array = walk + self.scatter_rad_s**2 * np.eye(len(walk))
         return drift if self.instability_rad_s == 0.0 else drift + _flicker(self.instability_rad_s, windows_s)
@@ -135,8 +135,9 @@ def _flicker(instability_rad_s: float, windows_s: ArrayLike) -> Array:
 def average_posterior(sizes: Array, likelihood: Array) -> Array:
     """Return the root-mean-square (2,) of random walk q and scatter s over the posterior of their `sizes` (K, 2).
 
-    The most likely sizes, and with them every uncertainty, would by chance be far too small or too large. The prior is
-    spike-and-slab, log-uniform in the slab (Mitchell and Beauchamp, J. Am. Stat. Assoc. 83 (1988) 1023).
+    The most likely sizes are not used, because by chance they, and with them every uncertainty, may be far too small or
+    too large. The prior is spike-and-slab, log-uniform in the slab (Mitchell and Beauchamp, J. Am. Stat. Assoc. 83
+    (1988) 1023).
     """
     return _root_mean_square(sizes, likelihood - np.log(GRID_POINTS) * np.count_nonzero(sizes, axis=1))
 
@@ -177,7 +178,7 @@ def bias_process(
     instability_rad_s: float = 0.0,
     chosen: Chosen = average_posterior,
 ) -> BiasProcess:
-    """Estimate the bias drift in mean readings (N, 3) of the model `design` (N, p) × parameters + drift + noise.
+    """Return the bias drift that explains mean readings (N, 3) = `design` (N, p) × parameters + drift + noise.
 
     `variances_rad2_s2` (N, 3) are the variances of the noise, `windows_s` (N, 2) the averaging windows. The three axes
     have one process, since few averages determine it. `shared_rad2_s2` (3, N, N) are covariances between the averages

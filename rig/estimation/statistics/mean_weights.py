@@ -37,8 +37,9 @@ def mean_weights(groups: Array, nuisance: Array) -> Array:
 def invert_squares(squares: Array) -> Array:
     """Return the pseudoinverse of the products (k, k) of columns, without directions in which they are collinear.
 
-    Without such directions it is the inverse, which takes a fifth of the time. The product of the two norms is above
-    the ratio of the largest to the smallest singular value.
+    If there are no such directions, the pseudoinverse is the inverse, which takes a fifth of the time. To decide this,
+    the ratio of the largest to the smallest singular value is bounded by the product of the norms of matrix and
+    inverse.
     """
     try:
         inverse = np.linalg.inv(squares)

@@ -87,7 +87,7 @@ class _Ascent:
 
 
 class MixedModel:
-    """A `Mixed` with its likelihood."""
+    """The likelihood, the posterior and the solutions of a `Mixed` model."""
 
     def __init__(self, mixed: Mixed) -> None:
         self.mixed = mixed
@@ -115,7 +115,7 @@ class MixedModel:
         return self._whiten(std)[-1] + self._log_prior(np.log(std))
 
     def restrict(self, std: Array) -> tuple[Array, Array]:
-        """Return P (m, m) and P y (m,) of the restricted likelihood: C⁻¹ minus its projection onto the design."""
+        """Return P (m, m) of the restricted likelihood, which is C⁻¹ without the part that θ explains, and P y (m,)."""
         lower, _, _, information, _ = self._whiten(std)
         return self._project(lower, information)
 
@@ -149,7 +149,7 @@ class MixedModel:
         return np.exp(distinct)
 
     def _climb(self, logarithms: Array, earlier: Sequence[_Ascent] = (), most_steps: int = MAX_NEWTON_STEPS) -> _Ascent:
-        """Climb from `logarithms` (k,) of the standard deviations to a maximum of the posterior.
+        """Return a search that climbs from `logarithms` (k,) of the standard deviations to a maximum of the posterior.
 
         The search ends early if it joins an `earlier` ascent. The method is Newton's in a trust region, and the
         curvature is the average information (Gilmour, Thompson and Cullis, Biometrics 51 (1995) 1440). A step to
