@@ -22,7 +22,7 @@ FALSE_ALARM_PROBABILITY = 0.02  # for a run whose bias is steady
 
 @dataclass(frozen=True, slots=True)
 class BiasStep:
-    """A step of the bias before repeat `repeat`, counted from 0, by `change` (3,) of uncertainty `std` (3,)."""
+    """A step of the bias before repeat `repeat`, counted from 0, by `change` (3,) with the standard deviation `std`."""
 
     repeat: int
     change: Array
@@ -40,7 +40,7 @@ class BiasByRepeat:
 
     - `bias` (R, 3); `std` (R, 3): standard deviation of its differences; `moves`: the steps of the bias.
     - `excess` (3,): the ratio of the scatter of means in an attitude to their standard deviation, at least 1 (Birge
-      ratio). Causes: inexact repeats of attitudes, or bias drift within a repeat. `std` includes it.
+      ratio). It is due to inexact repeats of attitudes, or to bias drift within a repeat, and is included in `std`.
     - `dof` (3,): degrees of freedom of the excess if there is one, else infinite.
     """
 

@@ -34,7 +34,7 @@ class BiasOverTemperature:
 
 
 def bias_over_temperature(bias: Array, std: Array, temperature_c: Array, time_s: Array) -> BiasOverTemperature:
-    """Fit the slope of biases (R, 3) of uncertainty `std` (R, 3) at mean temperatures (R,) and times (R,).
+    """Return the slope of biases (R, 3) with the standard deviations `std` at mean temperatures (R,) and times (R,).
 
     Larger residuals increase the standard deviations (Birge ratio). Raise Fault `too_few_observations`,
     `temperature_not_recorded`, `temperature_range_too_small`, `temperature_and_time_confounded`.

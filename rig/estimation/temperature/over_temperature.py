@@ -5,10 +5,11 @@ plan. Only the changes from repeat to repeat depend on temperature:
 
     m = offset(pose) + (1/(1 + q(T)) − 1) F x + c(T) + hysteresis + lag · dT/dt · ∂m/∂T + noise and bias drift
 
-q and c are polynomials in T − reference without a constant. The order of q and the order of c, each common to all axes,
-minimise AICc (Hurvich and Tsai, Biometrika 76 (1989) 297). The results of the other orders, with their Akaike weights
-(Burnham and Anderson, Model Selection, 2002, 4.3), contribute to the uncertainty. The hysteresis, the difference of
-warming and cooling, closes at both ends of the range. The thermometer's lag is fitted too.
+x is the input, F the matrix at the reference temperature, and T − reference is the variable of the polynomials q and c,
+which have no constant. The order of q and the order of c, each common to all axes, minimise AICc (Hurvich and Tsai,
+Biometrika 76 (1989) 297). The results of the other orders, with their Akaike weights (Burnham and Anderson, Model
+Selection, 2002, 4.3), contribute to the uncertainty. The hysteresis, the difference of warming and cooling, closes at
+both ends of the range. The thermometer's lag is fitted too.
 """
 
 from collections.abc import Iterator
@@ -151,7 +152,7 @@ def powers_at(difference_k: float) -> Array:
 
 
 def fit_over_temperature(readings: RepeatedMeans, reference_c: float, gradient_k: float) -> OverTemperature:
-    """Fit scale and bias as polynomials of T − `reference_c` to the readings.
+    """Return scale and bias as polynomials of T − `reference_c`, fitted to the readings.
 
     Plain least squares determine the scale factors at the reference; `combine_with_reference` replaces them by better
     ones. When the sensor is in use, the temperature difference between thermometer and sensor may differ by up to
@@ -328,7 +329,7 @@ class _ParameterFits:
         )
 
     def solve(self, orders: tuple[int, int]) -> _TemperatureFit:
-        """Fit temperature polynomials of the given orders for k and c."""
+        """Return the fit of temperature polynomials of the given orders for k and c."""
         of_scale, of_bias = orders
         loops = 2 if self.has_both_directions else 0
         per_axis = of_scale + of_bias + loops
