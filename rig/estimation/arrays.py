@@ -13,7 +13,7 @@ MAD_TO_STD = 1.4826  # standard deviation over median absolute deviation, of nor
 
 
 def scale_of(matrix: Array) -> Array:
-    """Return the factors (3,) by which to multiply readings `matrix` × input: 1 over the length of each row."""
+    """Return the scale factors (3,) of a sensor that reads `matrix` · input: 1 over the length of each row."""
     scale: Array = 1 / np.linalg.norm(matrix, axis=1)
     return scale
 
@@ -44,7 +44,7 @@ def integrate_rates(time_s: Array, rates: Array) -> Array:
 
 
 def median(values: NDArray[Any], axis: int = -1) -> Array:
-    """Return the median of finite values along an axis, NaN of none.
+    """Return the median of finite values along an axis; NaN if the axis has no values.
 
     NumPy's median takes three times as long, mostly to look for NaN.
     """
@@ -58,13 +58,13 @@ def median(values: NDArray[Any], axis: int = -1) -> Array:
 
 
 def distinct(values: NDArray[Any]) -> NDArray[Any]:
-    """Return the distinct values, rising, of a few values of any shape."""
+    """Return the distinct ones among a few values of any shape, in rising order."""
     ordered = np.sort(values, axis=None)
     return ordered[np.append(True, ordered[1:] != ordered[:-1])[: len(ordered)]]
 
 
 def median_step(rising: Array) -> float:
-    """Return the median interval between two adjacent of rising values (n,)."""
+    """Return the median difference between adjacent values of a rising series (n,)."""
     return float(median(np.diff(rising)))
 
 
@@ -96,7 +96,10 @@ def equal_runs(values: NDArray[Any]) -> NDArray[np.intp]:
 
 
 def runs_between(changes: NDArray[np.bool_], count: int) -> NDArray[np.intp]:
-    """Return the runs of `count` values, as `equal_runs` does; `changes` (count − 1,) marks where a new one begins."""
+    """Return the first index and the end (k, 2) of each run of `count` values.
+
+    `changes` (count − 1,) is true at i if a new run begins at value i + 1; the ends are exclusive.
+    """
     bounds = np.concatenate([[0], np.flatnonzero(changes) + 1, [count]])
     return np.column_stack([bounds[:-1], bounds[1:]])[:count]
 

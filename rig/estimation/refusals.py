@@ -151,7 +151,7 @@ def check_reading_ratio(ratio: float, where: str) -> None:
 
 
 def is_plausible(ratio: ArrayLike) -> NDArray[np.bool_]:
-    """Return a mask of ratios, of reading to true value or the reverse, that a sensor can have."""
+    """Return a mask, true for those ratios of reading to true value, or the reverse, that a sensor can have."""
     ratios = np.asarray(ratio, dtype=np.float64)
     return (ratios < MAX_SCALE_RATIO) & (ratios > 1 / MAX_SCALE_RATIO)
 
@@ -295,7 +295,7 @@ class Conditioning:
 
 
 def condition_of(design: Array, needed: int, noise: float = 0.0) -> Conditioning:
-    """Return the conditioning of a design (n, p) with columns in comparable units and a rank of `needed`.
+    """Return the conditioning of a design (n, p) with columns in comparable units, which should have the rank `needed`.
 
     Singular values below rounding errors, or below three times `noise` (the norm of measurement noise in a measured
     design), do not count towards the rank.

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 def residual_std_rad_s(explained: VectorFit) -> Array:
     """Return the standard deviations (N, 3), rad/s, of the vector model's residuals.
 
-    Their covariance is (1 − H) V (1 − H)ᵀ, with the hat matrix H and the covariance V of the mean readings.
+    Their covariance is (I − H) V (I − H)ᵀ, with the hat matrix H and the covariance V of the mean readings.
     """
     inputs, solution = explained.inputs, explained.solution
     rates, gravity = inputs.rates_rad_s, None if solution.g_sensitivity is None else inputs.apparent_gravity_m_s2

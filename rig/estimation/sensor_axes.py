@@ -1,6 +1,6 @@
 """The axes in a gyroscope's matrix F: scale factors, the angles between axes, the sensor's mounting.
 
-Row F_i = a_i / k_i, with a_i the unit vector of sensor axis i in the flange frame.
+Row i of F is a_i / k_i, with the unit vector a_i of sensor axis i in the flange frame and its scale factor k_i.
 """
 
 from dataclasses import dataclass
@@ -89,8 +89,8 @@ def parameter_jacobian(matrix: Array, scale: Array) -> Array:
 def angle_jacobian(axes: Array, scale: Array, rotation: Array) -> Array:
     """Return the derivative (6, 9) of non-orthogonality and mounting `rotation` with respect to F, row by row.
 
-    A row a_i of the axes A changes by δa_i = k_i (1 − a_i a_iᵀ) δF_i. The mounting R of A = S R changes by
-    δR = [δθ]× R, in which (tr S − S) δθ is the axial vector of M − Mᵀ with M = δA Rᵀ.
+    A row a_i of the axes A changes by δa_i = k_i (I − a_i a_iᵀ) δF_i. The mounting R of A = S R changes by δR = [δθ]×
+    R, in which (I tr S − S) δθ is the axial vector of M − Mᵀ with M = δA Rᵀ.
     """
     project = scale[:, None, None] * (IDENTITY - axes[:, :, None] * axes[:, None, :])
     stretch = axes @ rotation.T
