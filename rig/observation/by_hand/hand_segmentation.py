@@ -59,7 +59,7 @@ def _find_gaps(time_s: Array, rates: Array) -> NDArray[np.bool_]:
 
 
 def _began_still(time_s: Array, rates: Array) -> bool:
-    """Return whether the body hardly moved in the first second; otherwise a hand held the body at first."""
+    """Return whether the body hardly moved in the first second; if not, a hand held the body at first."""
     first = rates[time_s < time_s[0] + BEGINNING_S]
     return bool(len(first) > 1 and first.std(axis=0).max() < MAX_STILL_SCATTER_RAD_S)
 

@@ -40,8 +40,8 @@ def find_rests(
 ) -> tuple[Window, ...]:
     """Return the rests of at least two blocks, from readings (n, 3) of one or several quantities at rising times (n,).
 
-    `still_at_first`: whether the first second scatters like a rest. `lying`: windows in which, by the file of the
-    motion, the body lies still for at least a part of the time.
+    `still_at_first`: whether the first second scatters like a rest. `lying`: windows in which the body lies still for
+    at least a part of the time, as the file of the motion states.
     """
     quantity = next(quantity for quantity in quantities().values() if quantity in readings)
     if len(time_s) < 2 * MIN_BLOCK_SAMPLES:
@@ -110,7 +110,7 @@ def _mask_blocks(times: Array, windows: Sequence[Window]) -> NDArray[np.bool_]:
 def _find_unturned(
     means: Array, steady: NDArray[np.bool_], tolerance: Array, lying: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:
-    """Return a mask (count,) of the blocks in which a gyroscope reads its bias: their `means` (count, 3) agree with it.
+    """Return a mask (count,) of the blocks whose `means` (count, 3) agree with the gyroscope's bias.
 
     The bias is the most frequent mean among the `steady` blocks (count,), within `tolerance` (3,). A steady turn may
     last nearly as long as the rests, so of nearly equally frequent means the smallest is taken. `lying` (count,) marks
