@@ -25,7 +25,7 @@ NEAR_MOTION_S = 0.5  # rest around motion that is used: longer than a coarse clo
 
 
 def estimate_time_base(board_time_s: Array, readings_rad_s: Array, motion: KnownMotion) -> TimeBase:
-    """Estimate the board's clock relative to the turner's from readings (n, 3) taken at board times (n,).
+    """Return the board's clock relative to the turner's, estimated from readings (n, 3) taken at board times (n,).
 
     Raise Fault `not_finite`, `impossible_times`, `board_clock_restarted`, `duplicated_samples`, `stuck_sensor`,
     `stuck_axis`, `time_base_not_found`.
@@ -107,8 +107,8 @@ def check_readings(board_time_s: Array, readings: Array) -> None:
 def _find_first_clock(board_time_s: Array, readings: Array, motion: KnownMotion) -> tuple[TimeBase, int]:
     """Return a coarse clock found from only the first samples of a long recording, and the number of these samples.
 
-    All samples are used in a recording of ordinary length, or if fewer do not suffice. The caller then extends the
-    fine clock repeatedly, each time to twice as long a time.
+    All samples are used in a recording of ordinary length, or if fewer do not suffice. Otherwise the caller refines the
+    clock with more and more samples, doubling their duration each time.
     """
     span_s = LONG_RUN_S
     while True:

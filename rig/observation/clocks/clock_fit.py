@@ -97,7 +97,10 @@ def _list_stages(
 
 
 def _iterate_clock(clock: TimeBase, board_time_s: Array, readings: Array, motion: KnownMotion) -> TimeBase:
-    """Refine the clock until it settles, with leaps if steps shrink slowly. Raise Fault `time_base_not_found`."""
+    """Return the clock after Gauss–Newton steps until it settles; regular leaps extrapolate steps that shrink slowly.
+
+    Raise Fault `time_base_not_found`.
+    """
     moved, inflation = np.zeros(2), None
     for number in range(1, MAX_FINE_STEPS + 1):
         before, last = clock, moved
@@ -122,8 +125,8 @@ def _refine_clock(
 ) -> tuple[TimeBase, Array]:
     """Return the clock after one Gauss–Newton step, and the inflation (3,) of each axis' variance due to correlation.
 
-    Model: m = A r(t) + c + noise, r the flange's rate at controller time t; A (3, 3) and c (3,) are also fitted.
-    Without `inflation`, estimate it from the residuals.
+    The model of a reading is m = A r(t) + c + noise, with the flange's rate r at the controller time t; A (3, 3) and c
+    (3,) are fitted too. If `inflation` is None, it is estimated from the residuals.
     """
     t, since = clock.controller_time_s(board_time_s), board_time_s - clock.reference_s
     columns = np.column_stack([motion.rate(t), np.ones(len(t))])

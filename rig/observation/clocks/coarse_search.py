@@ -51,10 +51,13 @@ def estimate_coarse_offset(board_time_s: Array, readings_rad_s: Array, motion: K
 
 @dataclass(frozen=True, slots=True)
 class _ArmRates:
-    """The arm's rates as functions of the step of their grid, nearly always the same for all drifts.
+    """The arm's rates on an even grid of times, as functions of the grid's step.
 
-    - at_step: the start of the motion, s, and its rate (3, n) every step from then on, with the mean subtracted.
-    - spectrum: the Fourier transform of that rate, extended by zeros to a size.
+    The last result of each function is stored, because nearly all drifts need the same step.
+
+    - at_step: takes a step; returns the start of the motion, s, and its rate (3, n) at every step from then on, with
+      the mean subtracted.
+    - spectrum: takes a step and a size; returns the Fourier transform of that rate, extended by zeros to the size.
     """
 
     at_step: Callable[[float], tuple[float, Array]]
@@ -62,7 +65,7 @@ class _ArmRates:
 
     @classmethod
     def sample(cls, motion: KnownMotion) -> "_ArmRates":
-        """Return the rates of a motion; of the last step and size they are kept."""
+        """Return the rates of a motion."""
         at_step = lru_cache(maxsize=1)(partial(_sample_rate, motion))
         return cls(at_step, lru_cache(maxsize=1)(lambda step_s, size: np.fft.rfft(at_step(step_s)[1], size)))
 
@@ -76,7 +79,7 @@ def _sample_rate(motion: KnownMotion, step_s: float) -> tuple[float, Array]:
 
 @dataclass(frozen=True, slots=True, order=True)
 class _Match:
-    """A candidate for the offset (controller − board); the larger of two matches is the better one.
+    """A candidate for the offset (controller − board); of two matches, the one that compares as larger is better.
 
     - `share`: the fraction of the sum of squares of all readings that the arm's motion explains. It is lower for a
       wrong offset that matches each sweep with the next one, because one sweep then has no match.
