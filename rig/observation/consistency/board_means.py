@@ -1,4 +1,4 @@
-"""The board's own average of each sweep, compared with the computer's mean of the same turn. Pure.
+"""The board's own average of each sweep, compared with the computer's mean of the same turn. Pure functions.
 
 The comparison shows an error that no residual shows: a mean reading that is paired with a wrong mean rate.
 
@@ -24,10 +24,10 @@ TIME_ROUNDING_S = 1e-7  # at most
 
 
 def compare_board_means(sensor: str, recordings: Sequence[ObservedRun]) -> dict[int, float]:
-    """Return by how much the board's average of each sweep deviates from the computer's mean, by the sweep's index.
+    """Return how much the board's average of each sweep deviates from the computer's mean, by the sweep's index.
 
-    The deviation is that of the worst axis, in standard deviations of the computer's mean. Sweeps that the board did
-    not average are absent.
+    A deviation is that of the worst axis, in standard deviations of the computer's mean. Sweeps that the board did not
+    average are absent.
     """
     deviations = dict[int, float]()
     for recording in recordings:
@@ -46,8 +46,8 @@ def compare_board_means(sensor: str, recordings: Sequence[ObservedRun]) -> dict[
 def _deviation(recording: ObservedRun, stream: Stream, turn: Observation, observed: BoardObserved) -> float:
     """Return the largest deviation of the three axes, in standard deviations: board's average minus prediction.
 
-    The frequencies of slow spectral lines are uncertain, so the variance contains what they change in the board's
-    average at random phases.
+    The frequencies of slow spectral lines are uncertain, so the variance includes the effect that these lines, with
+    random phases, have on the board's average.
 
     The computer's mean predicts the board's average, after two corrections for the board's different window and
     weights. The reading due to the rotation, mean minus zero, is scaled to the arm's mean rate in the board's window;

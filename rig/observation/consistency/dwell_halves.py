@@ -1,4 +1,4 @@
-"""The difference of the means of a dwell's halves, for a test against noise. Pure."""
+"""The difference of the means of a dwell's halves, for a test against noise. Pure functions."""
 
 from rig.estimation.arrays import Array
 from rig.estimation.statistics.rounding import Steps

@@ -1,4 +1,4 @@
-"""Masks of the samples in each part of a recorded movement. Pure."""
+"""Masks of the samples in each part of a recorded movement. Pure functions."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Raw readings of accelerometers and magnetometers in dwells and sweeps. Pure."""
+"""Raw readings of accelerometers and magnetometers in dwells and sweeps. Pure functions."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -79,7 +79,7 @@ def raw_field_dwells(name: str, recording: ObservedRun) -> list[RawDwell]:
 
 
 def rests_of_dwells(dwells: Sequence[RawDwell]) -> list[RawReadings]:
-    """Return the dwells as rests, each with its raw readings and their residuals from the dwell's mean."""
+    """Return the raw readings of each dwell, marked as those of a rest, and their residuals from the dwell's mean."""
     residuals = [dwell.still_counts - dwell.still_counts.mean(axis=0) for dwell in dwells]
     return [RawReadings(REST, dwell.counts, rest, np.zeros(3)) for dwell, rest in zip(dwells, residuals, strict=True)]
 

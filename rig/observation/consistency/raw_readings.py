@@ -1,4 +1,4 @@
-"""Raw readings of a revolution, a rest or a dwell, with their residuals. Pure."""
+"""Raw readings of a revolution, a rest or a dwell, with their residuals. Pure functions."""
 
 from dataclasses import dataclass, field
 from functools import partial

@@ -120,7 +120,7 @@ class _Division:
 
     - inside: all n samples of the window; used (n,): mask of those in a segment with enough samples.
     - enough: the indices of these segments among all p segments; ends_s (p + 1,): the segments' ends.
-    - time_s (m,), readings_rad_s (m, 3): the used samples; groups (m, p): above zero where a sample lies in a segment.
+    - time_s (m,), readings_rad_s (m, 3): the used samples; groups (m, p): above zero if a sample lies in a segment.
     """
 
     inside: slice
@@ -143,7 +143,7 @@ class _Division:
 
 
 def _divide(stream: Stream, average: Average, usable: NDArray[np.bool_], count: int) -> _Division:
-    """Divide the `usable` samples (n,) of an average into `count` segments, or fewer for few samples."""
+    """Return the `usable` samples (n,) of an average, divided into `count` segments, or fewer if samples are few."""
     inside = slice_time(stream, average.start_s, average.end_s)
     time_s = stream.time_s[inside]
     count = max(1, min(count, int(usable.sum()) // MIN_SAMPLES))
@@ -159,11 +159,12 @@ def _divide(stream: Stream, average: Average, usable: NDArray[np.bool_], count: 
 def _segment_revolution(
     stream: Stream, motion: ArmMotion, turn: Observation, count: int, sweep: int
 ) -> SegmentedAverage:
-    """Average a revolution or an arc in segments, without the spectral lines of the whole average.
+    """Return a revolution or an arc with the averages of its segments, without the spectral lines of the whole average.
 
-    Spectral lines slower than `SLOW_CYCLES` remain, because weights that cancel them would amplify the encoders' noise;
-    the variance of each segment includes them, unless they are the harmonics of a step. The noise is that of the whole
-    average, in which a vibration does not count as noise, even if the encoders measure it only in part.
+    Spectral lines slower than `SLOW_CYCLES` remain, because weights that cancel them would amplify the encoders' noise.
+    The variance of each segment includes these slow lines, unless one step of the readings explains them. The noise is
+    that of the whole average, in which a vibration does not count as noise, even if the encoders measure it only in
+    part.
     """
     average, axis = turn.average, turn.axis_flange
     times_s = stream.time_s[slice_time(stream, average.start_s, average.end_s)]
@@ -205,8 +206,9 @@ def _slow_line_variance(slow: Array, weights: Array, residuals: Array) -> Array:
     """Return the variance (3,) that slow spectral lines, columns (n, k) fitted to residuals (n, 3), add to means.
 
     The means have weights (p, n). The frequencies of slow lines are uncertain, so the variance is at least the means'
-    scatter around a linear drift in time. The drift is excluded, because it would be a fault, not a vibration. So would
-    be a step, whose harmonics are found as lines: if one step explains more than the lines, these add nothing.
+    scatter around a linear drift in time. The drift is excluded, because it would be a fault, not a vibration. A step
+    would be a fault too, but its harmonics look like lines. So if one step explains more than the lines, the variance
+    is zero.
     """
     vibration = slow @ fit_columns(slow, residuals)
     if _explain_by_step(residuals) > np.sum(vibration**2):
@@ -228,7 +230,7 @@ def _explain_by_step(residuals: Array) -> float:
 
 
 def _segment_rest(stream: Stream, motion: ArmMotion, average: Average, count: int, response: Array) -> SegmentedAverage:
-    """Average a rest in segments, without vibrations and the arm's oscillation: see `average_rests`."""
+    """Return a rest with the averages of its segments, without vibrations and without the arm's oscillation."""
     inside = slice_time(stream, average.start_s, average.end_s)
     division = _divide(stream, average, np.ones(inside.stop - inside.start, dtype=np.bool_), count)
     readings = division.readings_rad_s - motion.rates_at_samples(division.time_s) @ response.T

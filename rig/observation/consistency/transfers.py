@@ -5,8 +5,8 @@ them; transfers do. In a transfer two wrists turn by half a revolution, from res
 arm's mean rate as in a sweep. Each transfer is averaged as a whole.
 
 No spectral lines are sought in a transfer, because it is short, and the frequency of the servo's vibration rises and
-falls. A vibration at the data rate aliases to zero, an error of the mean that the scatter does not show: see
-`rig.analysis.consistency.gyroscope_checks`.
+falls. A vibration at the data rate aliases to zero, which causes an error of the mean that the scatter does not show
+(`rig.analysis.consistency.gyroscope_checks`).
 """
 
 from collections.abc import Iterator, Sequence
@@ -72,7 +72,7 @@ class WristTransfer:
 def average_transfers(
     name: str, recordings: Sequence[ObservedRun], matrix: Array, site: Site, extension_m: Array
 ) -> list[WristTransfer]:
-    """Average a gyroscope's readings in all transfers, except those with a missing or saturated sample.
+    """Return the averages of a gyroscope's readings in all transfers without a missing or saturated sample.
 
     The gyroscope is mounted at `extension_m` (3,) in the flange's frame; `matrix` (3, 3) converts rates to readings.
     """
