@@ -87,8 +87,8 @@ class Rows:
 class PlacedReadings:
     """Averages of the samples in one file in each attitude that another file states; `quantities` were recorded.
 
-    - `rows`: a gyroscope's averages, or why there are none; `turning`: its readings and all rows, for a solution by
-      rotation angles.
+    - `rows`: a gyroscope's averages, or the Fault that prevents them; `turning`: its readings and all rows, for a
+      solution by rotation angles.
     - `placements`: the placements of the other sensors, or the Fault that prevents them.
     - `clock`: the table's clock, if it had to be found.
     - `omitted`: rows that the recording does not cover, that repeat a time or are interpolated; `incomplete`: rows that
@@ -110,8 +110,8 @@ def read_attitudes(
     """Return the columns (N,) of a file of attitudes in any format; `mapped` describes columns with other names.
 
     Times of a text table are relative to `origin_s`. A row with `time_s` in place of `start_s` and `end_s` is valid at
-    one instant; if a counter of this time restarted, it goes on. If `inverse`, the quaternions in the file take table
-    to body coordinates. Raise as `attitudes_in` does; Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`.
+    one instant; restarts of a counter of time are removed. If `inverse`, the quaternions in the file take table to body
+    coordinates. Raise as `attitudes_in` does; Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`.
     """
     in_format = attitudes_in(path)
     if in_format is None:
@@ -140,7 +140,7 @@ def _drop_other_rows(path: Path, table: CsvTable) -> dict[str, Array]:
 
 
 def average_placements(samples: Samples, table: Mapping[str, Array], *, find_clock: bool = False) -> PlacedReadings:
-    """Average the samples of each attitude in `table`, the columns of a file of attitudes.
+    """Return the averages of the samples in each attitude of `table`, the columns of a file of attitudes.
 
     With `find_clock` the table's clock is estimated, and rows without samples are left out. Raise Refused
     `bad_quaternion`, `bad_attitude_row`, `overlapping_attitudes`; Fault `clocks_apart`, `lost_samples`,
@@ -231,7 +231,7 @@ class _ReferenceRows:
 def select_reports(rows: Mapping[str, Array]) -> tuple[dict[str, Array], NDArray[np.intp], tuple[Omitted, ...]]:
     """Return the attitudes that the reference reported, their numbers in the file, from 1, and what is left out.
 
-    Left out are rows of zero length whose time a longer one has, rows of four zeros, rows that were interpolated
+    Left out are rows of zero length at the time of a longer row, rows of four zeros, rows that were interpolated
     between reports, and a few others whose quaternions are no unit quaternions.
     """
     quaternions = np.column_stack([rows[name] for name in QUATERNION])
@@ -274,7 +274,7 @@ def _list_omitted(rows: _ReferenceRows, kept: _ReferenceRows, reason: str) -> It
 
 
 def _rows(time_s: Array, rate: Array, fixes: _ReferenceRows) -> Rows:
-    """Average the samples in each row's window, without variances if a row has too few samples to estimate noise."""
+    """Return the averages in each row's window, without variances if a row has too few samples to estimate noise."""
     cuts = [rate[inside(time_s, window)] for window in fixes.windows]
     counts = np.array([len(cut) for cut in cuts])
     noise = np.array([scatter_of(cut)[:2] for cut in cuts]) if counts.min() >= MIN_SAMPLES else None

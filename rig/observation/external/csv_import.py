@@ -4,9 +4,9 @@ The file of samples is that of `rig.observation.external.csv_samples`; only a gy
 
 The file of sweeps has `start_s`, `end_s` on the same clock, `axis_x`, `axis_y`, `axis_z` (unit vector of the turn in a
 frame fixed to the sensor's carrier, right-handed), and either `speed_rad_s` (mean speed) or `angle_rad` (angle turned
-from start to end). A row of speed or angle 0 is a rest, without an axis. If the table or servo vibrates, a sweep should
-be a whole turn, whose mean speed is 2π/T in any case. Standard deviations may be given: `angle_std_rad` of the angle
-reached, and `axis_std_rad` of the direction of the axis.
+from start to end). A row with the speed or angle 0 is a rest, without an axis. If the table or servo vibrates, a sweep
+should be a whole turn, whose mean speed is 2π/T in spite of it. Standard deviations may be given: `angle_std_rad` of
+the angle reached, and `axis_std_rad` of the direction of the axis.
 
 If a row states an angle, and the body is at rest before and after it, the solution compares the stated angle with the
 integral of the gyroscope's readings (`rig.estimation.gyroscope.rotations_by_angle`).
@@ -95,7 +95,7 @@ def read_sweeps(path: Path, mapped: MappedColumns | None = None, origin_s: int =
 
 
 def average_sweeps(samples: Samples, sweeps: Mapping[str, Array]) -> ExternalData:
-    """Average samples, including a gyroscope's, over sweeps given by the columns of their file.
+    """Return the averages of samples, including a gyroscope's, over sweeps given by the columns of their file.
 
     Raise Refused `bad_sweep`, `overlapping_sweeps`; Fault `stuck_sensor`; and as `check_times` and `average` do.
     """
@@ -154,11 +154,11 @@ def _list_hiding(by_angle: TurnedData, data: ExternalData) -> Iterator[Omitted]:
 
 
 def average(samples: Array, sweeps: Array, axes: Array, temperature_c: Array | None = None) -> ExternalData:
-    """Average samples (n, 4) = [time_s, x, y, z] over sweeps (k, 3) = [start_s, end_s, speed_rad_s] about axes (k, 3).
+    """Return the averages of samples (n, 4) over sweeps (k, 3) about axes (k, 3).
 
-    `temperature_c` (n,) is each sample's temperature, None without a thermometer. Raise Refused `time_not_increasing`,
-    `too_few_samples`, `overlapping_sweeps`, `bad_sweep`; Fault `too_few_observations`, `clocks_apart`, `lost_samples`,
-    `wrong_unit`.
+    A sample is [time_s, x, y, z], a sweep [start_s, end_s, speed_rad_s]. `temperature_c` (n,) is each sample's
+    temperature, None without a thermometer. Raise Refused `time_not_increasing`, `too_few_samples`,
+    `overlapping_sweeps`, `bad_sweep`; Fault `too_few_observations`, `clocks_apart`, `lost_samples`, `wrong_unit`.
     """
     time_s, readings = samples[:, 0], samples[:, 1:]
     check_times(time_s)
@@ -272,7 +272,7 @@ def _observation(row: int, mean: Average, speed_rad_s: float, axis: Array) -> Ob
 
 
 def _check_noisy(mean: Average, row: int) -> None:
-    """Raise Fault `stuck_sensor` if an axis has one value in a whole row: no scatter then shows the mean's error."""
+    """Raise Fault `stuck_sensor` if an axis has one value in a whole row, so that no scatter shows the mean's error."""
     quiet = np.flatnonzero(mean.noise_rad_s <= ROUNDING_RATIO * np.abs(mean.mean_rad_s))
     if len(quiet):
         axis = int(quiet[0])

@@ -23,7 +23,7 @@ MIN_READ_FRACTION = 0.5  # of a row's readings: fewer do not determine its mean
 
 
 def check_times(time_s: Array, where: str = "the samples") -> None:
-    """Raise Refused `too_few_samples`, or `time_not_increasing` for times that do not rise; both name `where`."""
+    """Raise Refused `too_few_samples`, or `time_not_increasing` unless times (n,) rise; messages begin with `where`."""
     steps_back = np.flatnonzero(~(np.diff(time_s) > 0))
     if len(steps_back):
         first = int(steps_back[0])

@@ -62,9 +62,9 @@ class GatheredFixes:
 def gather(turning: Turning, window_s: float | None = None, clock_s: float = 0.0) -> GatheredFixes:
     """Return the fixes of a reference's rows, in windows of a given or a suitable length.
 
-    Time t of the reference is time t + `clock_s` of the readings. Raise Fault if the body moves in too few of the
-    increments that remain, or in fewer than were left out. The Fault's name is the most frequent reason for
-    leaving out an increment (`lost_samples`, `saturation` or `turned_too_fast`), or `too_few_observations` if no
+    Time t of the reference is time t + `clock_s` of the readings. Only increments in which the body moves are counted:
+    raise a Fault if too few of these remain, or fewer than were left out. The Fault's name is the most frequent reason
+    for leaving out an increment (`lost_samples`, `saturation` or `turned_too_fast`), or `too_few_observations` if no
     increment was left out.
     """
     turning = select_covered(turning, clock_s)

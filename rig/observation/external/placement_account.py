@@ -1,4 +1,4 @@
-"""The rows of a reference that are no placement, and the readings left out of the others, with their reasons."""
+"""The rows of a reference that are not placements, and the readings left out of placements, with the reasons."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -45,7 +45,8 @@ class Account:
     def check_mostly_at_rest(self) -> None:
         """Raise Fault `not_at_rest` if the body moves in all rows, or in more than half of the dwells.
 
-        Raise `lost_samples` instead if most of the dwells without a rest have a gap in the readings that hides it.
+        Raise `lost_samples` instead if most of the dwells without a rest have a gap in the readings that hides the
+        rest.
         """
         left_out, windows = int((self.rest[self.dwells] < 0).sum()), self.rows.windows
         if (self.rest >= 0).any() and 2 * left_out <= int(self.dwells.sum()):

@@ -2,8 +2,9 @@
 
 The rates of densely written, evenly stamped rows determine offset and drift to a fraction of a millisecond
 (`rig.observation.clocks`). Rows that come slowly, or are stamped on arrival, have no such rates, and a drift fitted to
-them would only show errors of the time stamps. So only an offset is fitted to them, without drift: it minimises the sum
-of the absolute differences between the rows' and the readings' rotations from row to row (`robust_start`).
+them would only show errors of the time stamps. So only an offset is fitted to such rows, without drift. This offset
+minimises the sum of the absolute differences between the rotations that rows and readings show from row to row
+(`robust_start`).
 """
 
 from dataclasses import replace

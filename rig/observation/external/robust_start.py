@@ -5,8 +5,8 @@
 Here m are the readings, b is the bias, F (3, 3) converts rates to readings, τ is the offset of the clock, and φ is the
 rotation vector from the row at t₁ to the row at t₂, Δt later. The equation holds to second order for any φ below π,
 however far apart the rows are. The fit minimises the sum of the residuals' lengths (least absolute deviations by
-reweighting), over a grid of τ, so a few bad rows have no effect. Long rests have none either, because only pairs of
-rows between which the body moves determine F and τ.
+reweighting), over a grid of τ, so a few bad rows have no effect. Long rests have no effect either, because only pairs
+of rows between which the body moves determine F and τ.
 """
 
 from dataclasses import dataclass
@@ -99,7 +99,7 @@ def _select_evenly(indices: NDArray[np.intp]) -> NDArray[np.intp]:
 
 
 def _fit(design: Array, turned: Array) -> tuple[float, Array]:
-    """Fit X (4, 3), Fᵀ above b, so that `design` (k, 4) X ≈ `turned` (k, 3); return the unexplained fraction, and X."""
+    """Return the fraction of `turned` (k, 3) that `design` (k, 4) X does not explain, and the fitted X: Fᵀ above b."""
     aligned = np.concatenate([np.eye(3), np.zeros((1, 3))])
     weight = np.ones(len(design))
     solution = aligned

@@ -64,10 +64,10 @@ class DeclaredTurns:
 def find_turns(
     time_s: Array, readings: Array, declared: DeclaredTurns, sweeps: Sequence[Observation], rests: Sequence[Average]
 ) -> TurnedData | None:
-    """Return the turns that start and end at rest, as the readings (n, 3), rad/s at `time_s` (n,), show; or None.
+    """Return the turns that, according to readings (n, 3) in rad/s, start and end at rest; None if there are none.
 
-    The other `sweeps` stay sweeps: their mean readings are among the `means` of the result. Turns with gaps that may
-    hide too much rotation are left out. `rests` are the rests that the file states.
+    The other `sweeps` stay sweeps, and their mean readings are among the `means` of the result. Turns with gaps that
+    may hide too much rotation are left out. `rests` are the rests that the file states.
     """
     pauses = _find_pauses(time_s, sweeps)
     found_rests = find_rests(time_s, {RATE: readings}, lying=pauses)
