@@ -26,13 +26,15 @@ MAX_MOMENT_S = 0.4  # a row of attitudes with a longer duration declares a rest
 
 @dataclass(frozen=True, slots=True)
 class Format:
-    """A kind of file: its `name` in messages, and its readers, which run in a process of their own.
+    """A kind of file, and its readers ("module:function"), which run in a process of their own.
 
-    `readings` and `attitudes` are readers ("module:function", as in `rig.data.processes.reading_process`), None if a
-    file cannot hold them. A reader gets two arguments: the path that the function `reads` returns for the user's path,
-    and `inside`, the part of the file that the user selected, or None. It yields columns as described in
-    `rig.observation.formats.table_parts`, named as in a CSV file; attitudes are times and quaternions. `is_one`:
-    whether a path names such a file. `remedy`: advice if a file cannot be read.
+    A reader gets two arguments: the path that `reads` returns, and the part of the file that the user selected, or
+    None. It yields columns as described in `rig.observation.formats.table_parts`, named as in a CSV file.
+
+    - name: the kind of file in messages; remedy: advice if a file cannot be read.
+    - is_one: a function that tells whether a path names such a file.
+    - readings: the reader of readings; attitudes: that of times and quaternions, None if such a file has none.
+    - reads: a function that returns the path to read for the path that the user names.
     """
 
     name: str

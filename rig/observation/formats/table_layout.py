@@ -184,9 +184,9 @@ def _have_nan(columns: Any) -> bool:
 
 
 def _find_beginning(path: Path, largest_mb: int) -> tuple[int, list[str], list[str]]:
-    """Return the number of lines to skip, the groups' heading above the columns', and this; both may be empty.
+    """Return the number of lines to skip, the heading of groups of columns, and the heading of columns.
 
-    Raise Refused `wrong_columns`.
+    Either heading may be empty. Raise Refused `wrong_columns`.
     """
     for skip in range(MAX_SKIPPED_LINES):
         rows = [*islice(read_rows(path, largest_mb, skip), 6)]
