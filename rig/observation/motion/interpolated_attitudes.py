@@ -1,8 +1,8 @@
 """Attitudes that a program interpolated between those that a reference reported.
 
-Robots report a few attitudes per second. Who aligns them with a sensor's samples often interpolates the four numbers of
-the quaternion linearly, over time or from row to row. An interpolated row adds no information: its error is that of
-the reports around it. Between q and −q, which are one attitude, the interpolation passes through zero.
+Robots report a few attitudes per second. To align them with a sensor's samples, programs often interpolate the four
+numbers of the quaternion linearly, over time or from row to row. An interpolated row adds no information, because its
+error is that of the reports around it. Between q and −q, which are one attitude, the interpolation passes through zero.
 """
 
 import numpy as np
@@ -45,8 +45,9 @@ def find_interpolated(time_s: Array, quaternions: Array) -> NDArray[np.bool_]:
 def _measure_chords(time_s: Array, quaternions: Array) -> tuple[Array, Array]:
     """Return the distances (2, n − 2) of rows from the chord between their neighbours, and those of unit quaternions.
 
-    The point of the chord is that of an interpolation from row to row, then that of one over time. At the fraction w of
-    a chord of length d, a unit quaternion is w (1 − w) d² / 2 away from it.
+    The first distances are from the point of the chord that an interpolation from row to row gives, the second from the
+    point that an interpolation over time gives. At the fraction w of a chord of length d, a unit quaternion has the
+    distance w (1 − w) d² / 2.
     """
     before, rows, after = quaternions[:-2], quaternions[1:-1], quaternions[2:]
     steps_s = np.diff(time_s)

@@ -29,7 +29,7 @@ class Revolution:
     - `attitude` (3, 3): transforms a vector from the arm's base frame to the flange's, at the start.
     - `arm_m` (3,): a vector from the joint's axis to the flange's origin, in the flange's frame.
     - `station`: the joint, from 0 at the base, and the pose in which it turned.
-    - `uneven`: the encoder errs by a degree, so the shaft's angle is known only over whole turns.
+    - `uneven`: whether the encoder errs by a degree, so that the shaft's angle is known only over whole turns.
     """
 
     start_s: float
@@ -182,7 +182,7 @@ def _check_slider(turning: NDArray[Any], where: str) -> None:
 
 
 def _check_speed(time_s: Array, travelled: Array, where: str, settings: ObservationThresholds) -> None:
-    """Raise Fault `speed_not_constant` if the rate strays from its mean, as after a halt; smoothing hides vibration."""
+    """Raise Fault `speed_not_constant` if the rate, smoothed to hide vibration, strays from its mean, as at a halt."""
     middles = np.arange(time_s[0] + SMOOTHING_S / 2, time_s[-1] - SMOOTHING_S / 2, SMOOTHING_S / 5)
     ahead = np.interp(middles + SMOOTHING_S / 2, time_s, travelled)
     behind = np.interp(middles - SMOOTHING_S / 2, time_s, travelled)

@@ -2,7 +2,7 @@
 
 A reading recurs one turn later at the same angle of the shaft, so the encoder's nonlinearity cancels over a whole turn,
 as does all unevenness with the period of a turn (a gear's ripple, backlash, an unbalanced load). The noise and steps of
-the readings, and the clock's jitter, remain. Pure.
+the readings, and the clock's jitter, remain. Pure functions.
 """
 
 from dataclasses import dataclass
