@@ -119,7 +119,7 @@ def _rotate(angle_rad: Array) -> NDArray[np.complex128]:
 def harmonics(angle_rad: Array, most: int) -> Array:
     """Return columns (n, 2 most) of cosine and sine of the first `most` harmonics of a turn.
 
-    They are powers of the first: products take a tenth of the time of cosines.
+    They are computed as powers of the first harmonic, because products take a tenth of the time of cosines.
     """
     powers = np.cumprod(np.broadcast_to(_rotate(angle_rad), (most, len(angle_rad))), axis=0)
     columns = np.stack([powers.real, powers.imag], axis=1).reshape(2 * most, len(angle_rad))
@@ -152,7 +152,7 @@ def fit_residuals(columns: Array, values: Array) -> Array:
 
 
 def find_angle_change_rad2(residuals: Array, columns: Array, lines_hz: Array) -> Array:
-    """Return the mean square (3,), rad², of the change of the body's angle, due to vibration, between random moments.
+    """Return the mean square (3,), rad², of the body's rotation by vibration from one random moment to another.
 
     The vibration is the spectral lines whose columns (n, w k) are fitted to residuals (n, 3). A line of mean square P
     and frequency f has the angle amplitude √(2 P) / (2π f), so the mean square of its change is P / (2 π² f²).

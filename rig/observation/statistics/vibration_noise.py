@@ -21,7 +21,7 @@ SHORT_ORDERS = (1, 2)  # orders of autoregression that fit coloured noise, but n
 
 
 def average_rest(readings: Array, time_s: Array, window: Window, steps: Steps) -> Mean:
-    """Average readings at rest with weights that cancel a vibration (`average_tapered`), so that it is not noise."""
+    """Return the mean of readings at rest with weights that cancel a vibration, which then does not count as noise."""
     residuals = readings - readings.mean(axis=0)
     shaking = _columns(residuals, LineSearch(sidebands=0))
     columns = np.column_stack([np.ones(len(residuals)), shaking])
@@ -55,7 +55,10 @@ def _columns(residuals: Array, search: LineSearch) -> Array:
 
 
 def estimate_noise(residuals: Array, parameters: int, steps: Steps, memories: Sequence[int]) -> MeanNoise:
-    """Return the noise of residuals (n, 3) after a fit of `parameters` columns, with the orders `memories`."""
+    """Return the noise from residuals (n, 3) after a fit of `parameters` columns.
+
+    `memories` are the orders of the autoregressive model (`fit_autoregression`) to choose from.
+    """
     scatter = np.maximum(np.sum(residuals**2, axis=0) / (len(residuals) - parameters), steps.variance)
     inflations = [fit_autoregression(axis, memories) for axis in residuals.T]
     return MeanNoise(
