@@ -150,7 +150,8 @@ def _unwrap(log: _UnorderedLog) -> _UnorderedLog:
 def find_restart_s(stamps_s: Array) -> float | None:
     """Return the period after which the counter of stamps (n,) restarted at zero, None if it did not.
 
-    A clock that was set back by about a counter's period is no restart: then the step over it is unusual.
+    A clock that was set back by about a counter's period is no restart, because the interval across the jump is
+    unusual.
     """
     steps_s = np.diff(stamps_s)
     backward_steps = np.flatnonzero(steps_s < 0)
