@@ -1,1 +1,1 @@
-"""From a recording to averaged observations: time base, revolutions, rests. Pure."""
+"""From a recording to averaged observations: time base, revolutions, rests. Pure functions."""

@@ -1,4 +1,4 @@
-"""Placements from an arm's dwells, for the kinds of sensors that installed packages add. Pure."""
+"""Placements from an arm's dwells, for the kinds of sensors that installed packages add. Pure functions."""
 
 from collections.abc import Sequence
 
@@ -22,7 +22,7 @@ NO_RESTS = RestMeans({}, {}, {}, (), ())
 def placements_on_arm(
     recordings: Sequence[ObservedRun], name: str, quantity: Quantity, thresholds: ObservationThresholds
 ) -> Placements:
-    """Average a sensor's readings in all dwells; if a dwell was repeated, only its last recording is used.
+    """Return a sensor's mean readings and attitudes in all dwells; only the last recording of a repeated dwell counts.
 
     Raise Fault `no_attitudes`, `lost_samples` or `saturation`.
     """

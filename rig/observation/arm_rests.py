@@ -22,17 +22,17 @@ MIN_RESTS = 3  # fewest rests that show a drift of the bias
 def average_rests(
     run: RunData, stream: Stream, motion: ArmMotion, response: Array, superseded: Collection[int] = ()
 ) -> tuple[Average, ...]:
-    """Average all sufficiently long rests of the arm, except rests next to a sweep or dwell in `superseded`.
+    """Return the averages of the arm's sufficiently long rests, except rests next to a step in `superseded`.
 
-    A resting arm still oscillates. `response` (3, 3) converts the rates of this oscillation to readings, which are
-    subtracted.
+    `superseded` are the sweeps and dwells that a later recording repeats. A resting arm still oscillates; `response`
+    (3, 3) converts the rates of this oscillation to readings, which are subtracted.
     """
     rests = (_average_rest(stream, motion, window, response) for window in iterate_rests(run, superseded))
     return tuple(rest for rest in rests if rest is not None)
 
 
 def trim_rest(motion: ArmMotion, rest: Window) -> Window | None:
-    """Return a rest without its beginning and end; None if the arm moved, or if fewer than two states are in it."""
+    """Return a rest without its beginning and end; None if the arm moved in it, or if it has fewer than two states."""
     still = Window(rest.start_s + REST_SETTLING_S, rest.end_s - REST_SETTLING_S)
     moved_rad = motion.travel_rad(still)
     return still if moved_rad is not None and moved_rad <= MAX_TRAVEL_AT_REST_RAD else None
@@ -74,7 +74,7 @@ def estimate_bias_drift(rests: Sequence[Average]) -> Array:
 
 
 def _average_rest(stream: Stream, motion: ArmMotion, window: Window, response: Array) -> Average | None:
-    """Average a rest; return None if the arm moved in it or if it holds too few samples."""
+    """Return the average of a rest; None if the arm moved in it or if it holds too few samples."""
     still = trim_rest(motion, window)
     if still is None:
         return None

@@ -69,7 +69,8 @@ def check_temperatures(temperature_c: Array, rows: NDArray[np.intp], where: str)
 def check_unwrapped(time_s: Array, readings: Array, rows: NDArray[np.intp], quantity: Quantity, where: str) -> None:
     """Raise Refused `readings_overflow` if an axis of readings (n, 3) jumps from one end of its span to the other.
 
-    Such jumps are overflows: a signed 16-bit number continues after 32767 at −32768. Arguments: see `check_possible`.
+    Such jumps are overflows: a signed 16-bit number continues after 32767 at −32768. The other arguments are those of
+    `check_possible`.
     """
     if quantity not in MIN_SPAN or len(readings) < 2:
         return

@@ -1,4 +1,4 @@
-"""Averages of a magnetometer's readings in dwells, with the arm's attitude, and in rests at the home pose. Pure."""
+"""Averages of a magnetometer's readings in dwells, with the arm's attitude, and in rests at the home pose."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
@@ -36,10 +36,10 @@ def find_dwelling_companion(run: RunData, name: str, sensors: Iterable[str]) -> 
 
 
 def field_readings(recording: ObservedRun, name: str, thresholds: ObservationThresholds) -> tuple[StaticReading, ...]:
-    """Average a magnetometer's readings in the dwells in which an accelerometer with the same clock was read.
+    """Return a magnetometer's mean readings in the dwells in which an accelerometer with the same clock was read.
 
-    The time base found for the accelerometer's sensor also serves the magnetometer: their delays may differ, but a
-    delay changes no mean at rest. Raise Fault `lost_samples`, `saturation`, `stuck_axis`.
+    The time base found for the accelerometer's sensor also serves the magnetometer. The delays of the two may differ,
+    but a delay changes no mean at rest. Raise Fault `lost_samples`, `saturation`, `stuck_axis`.
     """
     other = find_companion(recording, name)
     if other is None:
@@ -62,7 +62,7 @@ def field_readings(recording: ObservedRun, name: str, thresholds: ObservationThr
 
 
 def field_mean(run: RunData, name: str, time_s: Array, dwell: DwellReading, thresholds: ObservationThresholds) -> Mean:
-    """Average a magnetometer's readings in a dwell, in tesla; `time_s` (n,) are its samples' times on the arm's clock.
+    """Return a magnetometer's mean reading in a dwell, tesla; `time_s` (n,) are its samples' times on the arm's clock.
 
     Raise Fault `lost_samples` or `saturation`.
     """
@@ -83,7 +83,7 @@ def read_field_in_dwells(recording: ObservedRun, name: str) -> Iterator[tuple[Dw
 def field_tests(
     recording: ObservedRun, name: str, thresholds: ObservationThresholds, home_q_rad: Sequence[float]
 ) -> tuple[Mean, ...]:
-    """Average the magnetometer's readings, in tesla, in each rest at the home pose, in the order of time.
+    """Return the magnetometer's mean reading, tesla, in each rest at the home pose, in the order of time.
 
     Raise Fault as `field_readings` does, but skip rests with fewer samples than a dwell needs, because the last samples
     of a run may arrive after its end.

@@ -1,4 +1,4 @@
-"""The sweeps and dwells that a recording holds from start to end, and their times. Pure."""
+"""The sweeps and dwells that a recording holds from start to end, and their times. Pure functions."""
 
 from rig.data.recording.run_data import RunData
 from rig.observation.windows import dwelt, swept

@@ -98,7 +98,7 @@ class SensorObservations:
 def observe_sensor(
     run: RunData, sensor: str, motion: ArmMotion, settings: ObservationThresholds, superseded: Collection[int] = ()
 ) -> SensorObservations:
-    """Average every finished sweep of a recording; `motion` is the arm's motion in it.
+    """Return the observations of a recording's finished sweeps and of its rests; `motion` is the arm's motion.
 
     Interrupted sweeps are left out, as are sweeps and dwells in `superseded`, which a later recording of the run
     repeats, and the rests next to them. Raise Fault `incomplete_revolution`, `arm_states_lost`, `speed_slider`,
@@ -230,7 +230,7 @@ def _average_revolution(
 
 
 def _sample_turn(time_s: Array, motion: ArmMotion, turn: Revolution, covered: NDArray[np.bool_]) -> SampledTurn:
-    """Return a turn at those times (n,) at which the arm's motion is recorded, that is, where `covered` (n,) is set."""
+    """Return a turn at those of the times (n,) at which the arm's motion is recorded, as the mask `covered` shows."""
     fraction = (time_s - turn.start_s) / turn.duration_s
     waves = harmonics(turn.angle_rad * fraction, 2 * turn.sidebands)[covered]
     if not turn.closed:

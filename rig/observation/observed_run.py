@@ -98,7 +98,7 @@ def times_s(run: RunData, sensor: str, bases: Mapping[str, TimeBase], gyroscope:
 def observe_run(
     run: RunData, thresholds: ObservationThresholds, superseded: Collection[int] = (), correction: Array | None = None
 ) -> ObservedRun:
-    """Observe every gyroscope of a recording.
+    """Return a recording with the observations of every gyroscope.
 
     Raise Fault as `motion_of` and `observe_sensor` do. `correction` (3, 3): rotation of the item from its nominal
     mount, if determined.
@@ -109,7 +109,7 @@ def observe_run(
 
 
 def observe_runs(runs: Sequence[RunData], corrections: Mapping[int, Array] = NO_ROTATIONS) -> tuple[ObservedRun, ...]:
-    """Observe each recording of a run with a finished sweep or dwell; if a step was repeated, the last is used.
+    """Return the observations of each recording with a finished sweep or dwell; a repeated step is used as last done.
 
     The first recording's thresholds apply to all. `corrections` contains, for a stage of the procedure, the
     `correction` of `observe_run`. Raise as `turner_of` does, and Fault as `observe_run` does.

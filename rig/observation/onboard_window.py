@@ -1,4 +1,4 @@
-"""The window of a revolution that the board is to average, and the sweeps that the board has averaged. Pure."""
+"""The window of a revolution that the board is to average, and the sweeps that the board has averaged."""
 
 from collections.abc import Collection, Sequence
 from typing import Any

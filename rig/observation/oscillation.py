@@ -12,7 +12,7 @@ MIN_OSCILLATION_ANGLES = 8  # fewest angles; the oscillation itself takes three 
 
 
 def remove_oscillation(q_rad: Array) -> Array:
-    """Return angles (n, k) of joints, evenly spaced, without the dominant sine about a mean.
+    """Return angles (n, k) of joints, evenly spaced in time, without the strongest sine about their means.
 
     All joints oscillate at one frequency, each with its own amplitude and phase. Least squares over a grid of
     frequencies determine these (Lomb's periodogram with a floating mean). Steps and creep are preserved.

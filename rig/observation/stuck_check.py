@@ -45,7 +45,7 @@ def check_rests(rests: Sequence[Average], slowest_rad_s: float) -> None:
 
 
 def check_other_direction(sweep: Sweep, valid_joints: Collection[str | None], fault: Fault) -> None:
-    """Raise Fault `stuck_sensor` if an earlier sweep of the joint read correctly, so the mounting is not to blame."""
+    """Raise Fault `stuck_sensor` instead of `fault` if another sweep of the joint shows that the mounting is right."""
     if sweep.joint_name in valid_joints:
         raise Fault("stuck_sensor", f"{fault.what}; in the other direction it read correctly", REMEDY) from fault
 

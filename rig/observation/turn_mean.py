@@ -82,7 +82,7 @@ class Lines:
 
 
 def turn_mean(readings: Array, steps: Steps, turn: SampledTurn) -> tuple[Mean, Array]:
-    """Return the mean of readings (n, 3) with resolution `steps`, and the weights (n,), also for the arm's rates."""
+    """Return the mean of readings (n, 3) with resolution `steps`, and the weights (n,), which also suit arm rates."""
     ones = whole(readings)
     steady = np.column_stack([ones, turn.regressors])
     lines = _find_turn_lines(readings, steady, turn)
@@ -141,7 +141,7 @@ def slow_columns(cycles: Array, sidebands: int) -> NDArray[np.bool_]:
 
 
 def _find_turn_lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines:
-    """Find the vibrations in readings (n, 3) that the `steady` columns (n, k) do not explain.
+    """Return the spectral lines of readings (n, 3) in the part that the `steady` columns (n, k) do not explain.
 
     The encoders' rate is searched for spectral lines first, because its fast lines appear in the readings at the same
     frequency. The residuals of the readings, without these lines, are then searched for the other lines.
@@ -180,9 +180,9 @@ def _find_turn_lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines
 
 
 def lag_columns(rate: Array, columns: Array, fraction: Array) -> Array:
-    """Return the columns (n, 2) by which a lagging sensor misreads the slow ripple of a rate (n,), (n, 0) without one.
+    """Return columns (n, 2) by which a lagging sensor misreads a rate's slow ripple, or (n, 0) if it has no ripple.
 
-    The ripple is sought in the part of the rate that `columns` (n, k) do not explain.
+    The ripple is sought in the part of the `rate` (n,) that `columns` (n, k) do not explain.
     """
     residuals = rate[:, None] - columns @ fit_columns(columns, rate[:, None])
     return _changes(_fit_slow_part(residuals, fraction) if _has_slow_ripple(residuals) else residuals[:, :0])

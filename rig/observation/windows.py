@@ -1,6 +1,7 @@
-"""The windows of a recording's sweeps, rests and dwells on the controller's clock. Pure.
+"""The windows of a recording's sweeps, rests and dwells on the controller's clock. Pure functions.
 
-Events are imported only where a recording's are read: a plan, which has windows too, need not load their twenty types.
+The types of events are imported only inside the functions that read a recording, because a plan, which has windows too,
+does not need them.
 """
 
 from collections.abc import Collection, Iterator

@@ -39,11 +39,11 @@ class SweptAcceleration:
 def swept_acceleration(
     stream: Stream, motion: ArmMotion, sweep: Sweep, turn: Revolution, settings: RunSettings
 ) -> SweptAcceleration:
-    """Fit the first harmonic of one sweep's revolution, together with its vibrations.
+    """Return the first harmonic of one sweep's revolution, fitted together with its vibrations.
 
     In the model only the sweep's joint moves, and the other joints stand at their mean angles. In truth these sway a
-    little, as the encoders show, and so tilt and accelerate the sensor: this specific force is added to the model.
-    Raise Fault `saturation`, `stuck_sensor`, `incomplete_revolution` or `not_finite`.
+    little, as the encoders show, and so tilt and accelerate the sensor. The specific force of this sway is added to the
+    model. Raise Fault `saturation`, `stuck_sensor`, `incomplete_revolution` or `not_finite`.
     """
     inside = slice_time(stream, turn.start_s, turn.end_s)
     check_acceleration(stream, inside, describe(sweep), turning=True)
