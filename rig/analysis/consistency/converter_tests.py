@@ -1,4 +1,4 @@
-"""Tests of readings as the output of a converter with a noisy input: their bits, range and repetitions. Pure.
+"""Tests of readings as the output of a converter with a noisy input: their bits, range and repetitions. Pure functions.
 
 If the noise exceeds one step, a healthy converter sets every low bit in half of its readings, and there is no gap, no
 pile-up at an end of the range, no run of equal readings and no repeated sequence. With less noise, a healthy converter

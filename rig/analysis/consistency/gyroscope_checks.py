@@ -103,7 +103,7 @@ class _TestedSegments:
 def check_gyroscope(
     segments: Segments, matrix: Array, false_alarm_probability: float, allowance: ErrorPatterns
 ) -> TestResults:
-    """Test the model of a gyroscope against each alternative, find outlier sweeps, and compute detection limits.
+    """Return the tests of a gyroscope's model against each alternative, the outlying sweeps, and the detection limits.
 
     Faults that persist (`changes`) are tested on the segments and the transfers between them, `differences` on the
     segments alone. Each test has the given false-alarm probability; `matrix` (3, 3) is F.
@@ -211,7 +211,7 @@ def _free_disturbed_transfers(
 def _inflate_transfers(
     segments_only: _TestedSegments, matrix: Array, allowance: ErrorPatterns, bias: BiasProcess, disturbed: Sequence[int]
 ) -> _TestedSegments:
-    """Whiten like `_whiten_with_transfers`, with the transfers' variance inflated until their χ² is at most its dof.
+    """Return `_whiten_with_transfers` with the transfers' variance inflated until their χ² is at most its dof.
 
     The transfers' χ² and dof are those of segments with transfers minus those of segments alone. The factor on their
     unexplained variance is at most `MAX_RIPPLE_INFLATION`.
@@ -344,7 +344,7 @@ def _jump_critical_value(jumps: int, false_alarm_probability: float) -> float:
 def _estimate_bias_process(
     segments: Segments, axis_rates: Array, steady_columns: Array, scatter: Scatter
 ) -> BiasProcess:
-    """Estimate the bias process from the residuals of orthonormal `steady_columns` (N, k)."""
+    """Return the bias process in the residuals of a fit of the orthonormal `steady_columns` (N, k)."""
     return bias_process(
         steady_columns,
         segments.means_rad_s - axis_rates,

@@ -1,4 +1,4 @@
-"""The check for a knock in a dwell, whose halves then differ by more than noise. Pure."""
+"""The check for a knock in a dwell, whose halves then differ by more than noise. Pure functions."""
 
 from collections.abc import Mapping, Sequence
 

@@ -41,7 +41,7 @@ DISTURBED_DWELL = "disturbed_dwell"
 class SegmentName:
     """The check's name `what`, and the index in the plan of the `sweep` or `dwell` that contradicts the others.
 
-    If all agree, the name stands for the worst sweep or dwell, and both indices are None.
+    If all sweeps and dwells agree, the name stands for the worst of them, and both indices are None.
     """
 
     what: str

@@ -71,7 +71,7 @@ class WhitenedModel(Protocol):
 def test_alternatives(
     model: WhitenedModel, alternatives: Alternatives, false_alarm_probability: float
 ) -> dict[str, Statistic]:
-    """Test every alternative that the model does not contain, each at `false_alarm_probability`."""
+    """Return the statistic of every alternative that the model does not contain, by the alternative's name."""
     statistics = {name: model.test(columns, (), false_alarm_probability) for name, columns in alternatives.items()}
     return {name: statistic for name, statistic in statistics.items() if statistic is not None}
 
@@ -121,8 +121,8 @@ def remaining_directions(model_basis: Array, columns: Array) -> Array:
 def chi_square_of(readings: Array, model_basis: Array, columns: Array | None) -> tuple[float, int]:
     """Return the χ² of readings (n,) that columns (n, k) explain after a fit of the model, and its dof.
 
-    `model_basis` (n, p) is orthonormal. If `columns` is None, the χ² is that of all residuals; it needs no
-    decomposition, which would be slow and might not converge.
+    `model_basis` (n, p) is orthonormal. If `columns` is None, the χ² is that of all residuals. It is then computed
+    without a decomposition, which would be slow and might not converge.
     """
     unexplained = readings - model_basis @ (model_basis.T @ readings)
     if columns is None:

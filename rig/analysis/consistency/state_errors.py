@@ -30,9 +30,9 @@ def build_time_patterns(segments: Segments, jitter_s: float) -> Array:
 def build_reading_patterns(segments: Segments, noise_rad: float) -> Array:
     """Return the patterns (P, N, 3) rad/s of joint angles read with noise at the edges of sweeps and transfers.
 
-    In sweeps, only the vibrating joints are included: the noise of the turning joint is part of the time jitter, and
-    joints at rest have no noise. In transfers all joints are included, because none turns at the ends. At each edge,
-    the joints have as many independent errors as their axes have directions: three at most.
+    In sweeps, only the vibrating joints are included, because the noise of the turning joint is part of the time
+    jitter, and joints at rest have no noise. In transfers all joints are included, because none turns at the ends. At
+    each edge, the joints have as many independent errors as their axes have directions: three at most.
     """
     lengths = np.diff(segments.times_s)
     patterns = []

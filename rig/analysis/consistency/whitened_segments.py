@@ -50,11 +50,11 @@ class WhitenedSegments:
 
     @cached_property
     def basis(self) -> Array:
-        """An orthonormal basis (3 N, p) of the model: many tests need it."""
+        """An orthonormal basis (3 N, p) of the model."""
         return orthonormal_basis(self.model)
 
     def chi_square_of(self, alternatives: Sequence[Array], nuisance: Sequence[Array]) -> list[float]:
-        """Return the χ² of each alternative (3, N, k): see `WhitenedModel`."""
+        """Return the χ² of each alternative (3, N, k), as `WhitenedModel` defines it."""
         basis = self._extend_basis(nuisance)
         return [
             chi_square_of(self.readings, basis, apply_whitener(self.whitener, columns))[0] for columns in alternatives
