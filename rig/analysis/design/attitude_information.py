@@ -1,4 +1,4 @@
-"""The information that a plan's attitudes give about the accelerometers of a configuration. Pure."""
+"""The information that a plan's attitudes give about the accelerometers of a configuration. Pure functions."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""The prediction of a plan's uncertainty: the budget of a simulated recording. Pure.
+"""The prediction of a plan's uncertainty: the budget of a simulated recording. Pure functions.
 
 The plan determines the joints' motion, the configuration determines the known errors of turner, site and sensor, and
 the data sheet determines the sensor's noise. Only two parts of a budget come from readings alone: the bias drift beyond

@@ -1,4 +1,4 @@
-"""The search for the shortest run that reaches a target uncertainty, by predictions of candidates. Pure."""
+"""The search for the shortest run that reaches a target uncertainty, by predictions of candidates. Pure functions."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""A plan divided into segments like a recording, with faultless readings. Pure."""
+"""A plan divided into segments like a recording, with faultless readings. Pure functions."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""The detection limits of a plan's checks, for faultless readings. Pure."""
+"""The detection limits of a plan's checks, for faultless readings. Pure functions."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -32,7 +32,7 @@ class DetectionLimits:
 
 
 def predict_limits(config: RigConfig, plan: Plan, turner: DenavitHartenberg) -> DetectionLimits:
-    """Predict the detection limits of the gyroscopes to calibrate and, on an arm, of the accelerometers.
+    """Return the predicted detection limits of the gyroscopes to calibrate and, on an arm, of the accelerometers.
 
     The `turner` is nominal, the noise is that of the data sheet, and flicker is the only bias drift. Of a plan over
     temperature, only the sweeps before the wait for its second temperature are used.

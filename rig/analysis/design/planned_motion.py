@@ -1,4 +1,4 @@
-"""The motion of a plan, in the form of a recorded motion. Pure."""
+"""The motion of a plan, in the form of a recorded motion. Pure functions."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

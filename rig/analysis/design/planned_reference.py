@@ -1,4 +1,4 @@
-"""Faultless readings of an accelerometer in a plan's dwells and sweeps. Pure."""
+"""Faultless readings of an accelerometer in a plan's dwells and sweeps. Pure functions."""
 
 from dataclasses import dataclass, replace
 

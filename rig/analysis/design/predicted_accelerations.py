@@ -1,4 +1,4 @@
-"""The prediction of the uncertainty of accelerometers by a plan's attitudes and sweeps. Pure.
+"""The prediction of the uncertainty of accelerometers by a plan's attitudes and sweeps. Pure functions.
 
 The plan determines the specific force, the data sheet the noise; the arm's errors are the stated axis errors and
 repeatability. Bias drift beyond flicker, and disturbances of single readings, are left out.

@@ -1,4 +1,4 @@
-"""The uncertainty that a run has reached so far. Pure."""
+"""The uncertainty that a run has reached so far. Pure functions."""
 
 from collections.abc import Sequence
 
