@@ -31,7 +31,7 @@ CONTRIBUTOR_SOURCES: Mapping[str, tuple[Literal["A", "B"], str]] = {
 
 
 def noise_dof(solution: TriaxialSolution, equations: Equations) -> float:
-    """Return the smallest of the degrees of freedom of scale and bias, (6,), for noise alone."""
+    """Return the smallest of the six degrees of freedom of scale and bias for noise alone."""
     response = response_in_attitudes(solution, equations.measurements)
     rows = scale_and_bias(solution.matrix, scale_of(solution.matrix), len(response)) @ response
     return fewest_dof(rows, equations.variances.ravel(), equations.dof.ravel())
@@ -42,8 +42,8 @@ def budget_by_causes(matrix: Array, causes: Mapping[str, Array], noise_dof: floa
 
     The causes are parts (p, p) of the covariance of a reference model's p parameters; the first nine of these are the
     `matrix` F (3, 3), row by row. All degrees of freedom are infinite, except those of the noise if `noise_dof` is
-    given: the standard uncertainty of a solution that integrates over the likelihood of its variance components, or
-    inflates by Student's t, already includes the components' uncertainty (JCGM 101, 6.4.9).
+    given. A solution that integrates over the likelihood of its variance components, or inflates by Student's t, needs
+    no finite ones, because its standard uncertainty includes the uncertainty of the components (JCGM 101, 6.4.9).
     """
     scale = scale_of(matrix)
     lines = []

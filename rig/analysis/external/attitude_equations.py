@@ -105,8 +105,8 @@ class Equations:
 def _estimate_variances(rows: Rows, reference: KnownVector) -> tuple[Array, Array]:
     """Return the variances (N, 3) of the means and their dof, from one variance for all samples.
 
-    The residuals of a fit with equal weights determine that variance: a model with attitude errors would mistake noise
-    for such errors. Raise Fault `too_few_observations` without redundant rows.
+    The residuals of a fit with equal weights determine that variance, because a model with attitude errors would
+    mistake noise for such errors. Raise Fault `too_few_observations` without redundant rows.
     """
     counts = rows.samples[:, None]
     quiet = np.full_like(rows.means, (1e-9 * np.abs(rows.means).max()) ** 2) / counts

@@ -49,7 +49,7 @@ class AttitudeCalibration:
     - `triad`: scale and axes; `budget`: the contributors to the uncertainty.
     - `other_methods`: the solutions by the other methods, or the Fault of a method that fails.
     - `measurements`: the means in attitudes; `dwells`: the placements.
-    - `reference_fault`: why the estimated reference of a gyroscope is not the Earth's rate.
+    - `reference_fault`: the Fault that says why a gyroscope's estimated reference is not the Earth's rate, or None.
     - `laid`: the estimated placement errors; `unplaced_rests`: how many rests without an attitude contribute to them.
     - `moving`: the number of rows left out because the body moved.
     """
@@ -72,10 +72,10 @@ Result = AttitudeCalibration | IncrementCalibration
 def solve_placed(
     name: str, placed: PlacedReadings, site: Site, options: SolveOptions, method: Chosen | None, *, second_order: bool
 ) -> Attempts[Quantity, Result | OfKind]:
-    """Calibrate every recorded quantity of a sensor by `method`; None chooses a method.
+    """Return the calibration of every recorded quantity of a sensor, or its Fault, by `method`.
 
-    The chosen method is "attitude_weighted". For a gyroscope it is "increments" (over windows of `window_s`), or
-    "maximum_likelihood" with `exact_rates`.
+    If `method` is None, it is "attitude_weighted"; for a gyroscope it is "increments" (over windows of `window_s`), or
+    "maximum_likelihood" if the options state `exact_rates`.
     """
     any_mounting, exact_rates = options.any_mounting, options.exact_rates
 

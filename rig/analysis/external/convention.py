@@ -34,7 +34,7 @@ class Convention:
     - scalar_last: the columns read as qw qx qy qz contain qx qy qz qw.
     - inverse: the quaternions take room to body coordinates; None if the motion does not show it.
     - lag_s: the time by which the readings are later than the attitudes.
-    - ratio: how many times as fast as its readings the gyroscope turned.
+    - ratio: the rate that the attitudes show, divided by the gyroscope's reading.
     - gravity: length of the mean specific force in the room, relative to the mean length; 0 without an accelerometer.
     - up: the room's axis that points upwards, as for `--up`; "" if no accelerometer shows it.
     """
@@ -77,8 +77,8 @@ def find_convention(samples: Samples, attitudes: Columns, *, is_order_named: boo
 def _choose_direction(best: Convention, other: Convention) -> Convention:
     """Return the better of two fits, whose direction is None if the readings do not show it.
 
-    Turns about one axis at a time fit both directions. Gravity then keeps its direction in the room only in the right
-    one.
+    Turns about one axis at a time fit both directions. Then only the right direction of the quaternions keeps gravity
+    constant in the room.
     """
     if 1 - best.explained <= MAX_UNEXPLAINED_RATIO * (1 - other.explained):
         return best

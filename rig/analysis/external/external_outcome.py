@@ -11,7 +11,7 @@ from rig.data.recording.run_data import RunData
 
 
 def calibrate_external(runs: Sequence[RunData], external: ExternalReadings, estimator: str) -> Outcome:
-    """Solve and judge readings whose motion a file describes; by default with the configured estimator.
+    """Return the outcome of readings whose motion a file describes; by default the configured estimator solves them.
 
     Raise as `solve_external` does.
     """

@@ -1,4 +1,4 @@
-"""The solution and checks of external readings, whose motion a file describes. Pure."""
+"""The solution and checks of external readings, whose motion a file describes. Pure functions."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -158,7 +158,10 @@ def _solve_turns(read: ExternalReadings, samples: Samples, name: str | None) -> 
 def _solve_sweeps(
     read: ExternalReadings, samples: Samples, name: str | None, reference_c: float | None
 ) -> ExternalResult:
-    """Solve a file's sweeps and rests, corrected to `reference_c` if given, by the estimator `name` (None: choose)."""
+    """Return the solution of a file's sweeps and rests by the estimator `name`; None chooses one.
+
+    The readings are first corrected to the temperature `reference_c`, if given.
+    """
     chosen = None if name is None else choose_estimator(SWEEP_ESTIMATORS, name)
     data, polynomials = average_sweeps(samples, read.motion), None
     if reference_c is not None and data.turned is not None:
@@ -217,7 +220,7 @@ def _mention(omitted: Sequence[Omitted]) -> Iterator[None]:
 
 
 def solve_swept(data: ExternalData, estimator: BySweeps | None) -> Estimate:
-    """Solve by `estimator`; None chooses "increments" if the body was turned from rest to rest, else "vector".
+    """Return the solution by `estimator`; None stands for "increments" if turns start and end at rest, else "vector".
 
     Raise Fault `no_turns`, `bias_jumped`, `scale_changed`, and as the estimators do.
     """
@@ -277,7 +280,7 @@ def _vector(data: ExternalData) -> VectorSolution:
 def _solve_attitudes(
     read: ExternalReadings, samples: Samples, settings: RunSettings, name: str | None
 ) -> ExternalResult:
-    """Solve all quantities of readings in known attitudes by the method `name` (None: one for each quantity)."""
+    """Return the solution of all quantities in known attitudes by the method `name`; None chooses one for each."""
     method, site, options = find_method(name), settings.site, settings.elsewhere
     assert options is not None, "of readings of others"
     placed = average_placements(samples, read.motion, find_clock=options.find_clock)

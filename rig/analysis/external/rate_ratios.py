@@ -1,6 +1,6 @@
-"""The rates of a reference over a gyroscope's readings, which show another unit, or the end of its range.
+"""The ratio of a reference's rates to a gyroscope's readings, which shows another unit, or the end of its range.
 
-A corrected gyroscope need not repeat one value at the end of its range: it has the noise of the other axes there.
+Corrected readings need not repeat one value at the end of the range, because they contain noise of the other axes.
 """
 
 import numpy as np

@@ -25,7 +25,7 @@ MAX_HALF_RANGE_RAD_S = 2 * RATE.steady
 
 
 def check_rests_agree(turning: Turning, solution: IncrementSolution) -> None:
-    """Raise Fault `bias_contradicts_rests` if the bias differs from the readings at rest, `bias_jumped` if these jump.
+    """Raise Fault `bias_contradicts_rests` if the bias differs from readings at rest, `bias_jumped` if the latter jump.
 
     A rest is used only if both the readings and the rows' attitudes show it. Rests may differ by their scatter, by
     motion that the reference does not show, and by the effect of gravity on a gyroscope.

@@ -51,7 +51,7 @@ def check_agree(data: ExternalData) -> None:
 
 
 def _name_contradiction(worst: int, data: ExternalData) -> str:
-    """Describe which sweeps contradict each other, by their rows."""
+    """Return a description of the sweeps that contradict each other, by their rows."""
     axis = data.sweeps[worst].axis_flange
     about = [sweep.sweep for sweep in data.sweeps if abs(sweep.axis_flange @ axis) > SAME_AXIS_COSINE]
     if len(about) == 2:
@@ -96,8 +96,8 @@ def sweep_errors(solution: VectorSolution, data: ExternalData) -> SweepErrors | 
     def inflate(to_values: Array, dof: float, noise_dof: float) -> Array:
         """Return the covariance (q, q), without noise, of values whose derivatives by F and c are `to_values` (q, 12).
 
-        It is that of motion errors of the median size, scaled for each value so that, together with the noise, it gives
-        the expanded uncertainty that follows from the posterior distribution of the errors' sizes.
+        The covariance is that of motion errors of the median size. For each value it is scaled so that, together with
+        the noise, it gives the expanded uncertainty that follows from the posterior distribution of the errors' sizes.
         """
         by_noise, of_rate, of_axis, by_wrong = (
             to_values @ effects @ effects.T @ to_values.T for effects in (noise, by_rate, by_axis, wrong)
@@ -127,7 +127,7 @@ def count_redundant_rows(data: ExternalData) -> int:
 
 
 def noise_dof(solution: VectorSolution, data: ExternalData) -> float:
-    """Return the smallest of the degrees of freedom of scale and bias, (6,), for noise alone, in the vector model."""
+    """Return the smallest of the six degrees of freedom of scale and bias for noise alone, in the vector model."""
     averages = [*(sweep.average for sweep in data.sweeps), *data.rests]
     variances = np.array([average.variance_rad2_s2 for average in averages])
     dof = dof_by_axis(average.dof for average in averages)
