@@ -1,4 +1,4 @@
-"""The check that the board's average of each sweep agrees with the computer's. Pure.
+"""The check that the board's average of each sweep agrees with the computer's. Pure functions.
 
 The check detects a mean reading that is paired with a wrong mean rate, which no residual shows.
 """

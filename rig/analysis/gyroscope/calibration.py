@@ -1,4 +1,4 @@
-"""The path from recordings to a gyroscope's calibration, common to runs and `rig solve`. Pure."""
+"""The path from recordings to a gyroscope's calibration, common to runs and `rig solve`. Pure functions."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -96,7 +96,7 @@ class SensorResult:
 
     @property
     def correction_matrix(self) -> Array:
-        """The matrix M (3, 3) of g = M (m + b)."""
+        """The matrix M (3, 3) of the correction rate = M (reading + bias)."""
         return self.corrected_by.matrix
 
     @property
@@ -138,7 +138,7 @@ def solve_observed(
     estimator: str = DEFAULT_ESTIMATOR,
     matrix_corrected: Collection[str] = (),
 ) -> dict[str, SensorResult]:
-    """Calibrate `sensors` from all recordings, which share the `environment`.
+    """Return the calibrations of `sensors`, by name, from all recordings, which share the `environment`.
 
     With the vector model, sensors in `matrix_corrected` are corrected by the whole matrix; all other corrections assume
     orthogonal axes. For every estimator, sweeps must suffice for the six-observation solution. Raise Refused

@@ -1,4 +1,4 @@
-"""The correction g = M (m + b) of readings m to rates g, on the board and in `calibration.h`. Pure.
+"""The correction g = M (m + b) of readings m to rates g, on the board and in `calibration.h`. Pure functions.
 
 M is a 3×3 matrix, b the bias. `diagonal` is the correction of the paper SIX: M = K, axis by axis. `matrix` also makes
 the axes orthogonal. In the vector model m = F ω − b, polar decomposition gives F = K⁻¹ S R: R is the rotation nearest

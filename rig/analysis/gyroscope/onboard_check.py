@@ -1,4 +1,4 @@
-"""The comparison of the board's own solution with one in double precision from the same observations. Pure.
+"""The comparison of the board's own solution with one in double precision from the same observations. Pure functions.
 
 Board and host average the same samples (the board reports which) and use the same speeds, so that only the arithmetic
 differs. If a sample was lost on its way to the host, the board's own mean replaces the host's. The run's calibration
@@ -53,7 +53,7 @@ class Agreement:
 
 
 def check_arithmetic(runs: Sequence[RunData], sensor: str) -> Agreement:
-    """Compare board and host for one sensor over all recordings of a run; the last one has the board's solutions."""
+    """Return how board and host agree on one sensor in a run, whose last recording contains the board's solutions."""
     solutions = {event.solution.method: event for event in _events(runs[-1], sensor) if isinstance(event, BoardSolved)}
     not_observed = _list_unobserved(runs[-1], sensor)
     host = _solve(_list_observations(runs, sensor))

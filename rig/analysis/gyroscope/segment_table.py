@@ -1,4 +1,4 @@
-"""The table of all segments of a sensor's revolutions and rests, with the sensed rates and gravity. Pure."""
+"""The table of all segments of a sensor's revolutions and rests, with the sensed rates and gravity. Pure functions."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -18,7 +18,7 @@ from rig.observation.consistency.transfers import WristTransfer
 class Segments:
     """N segments of revolutions and rests: means of their readings.
 
-    - sweep (N,): index of the revolution, −1 of a rest; transfers between these have numbers from −2 downwards.
+    - sweep (N,): index of the revolution, −1 for a rest; transfers between these have numbers from −2 downwards.
     - position (N,): from −1 in the first segment of a window to 1 in the last.
     - means_rad_s, variances_rad2_s2 (N, 3): mean readings and their variances.
     - rates_rad_s (N, 3): angular rate of the flange in inertial space, in its frame.
@@ -123,7 +123,7 @@ def append_transfers(
 
 
 def _vibration_changes(windows: Sequence[SegmentedAverage], explained: VectorFit, times_s: Array) -> Array:
-    """Return the variances (M, 3), rad², of the vibration's change in M transfers, by the nearest rests.
+    """Return the variances (M, 3), rad², of the vibration's change in M transfers, estimated from the nearest rests.
 
     `times_s` (M, 2): start and end of the transfers on the clock of the first recording.
     """

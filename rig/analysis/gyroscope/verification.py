@@ -43,7 +43,7 @@ def verify(
     *,
     gravity_rad_s: tuple[Array, Array] | None = None,
 ) -> Verification:
-    """Compare the readings that the board has calibrated (`after`) with those of the reference.
+    """Return the comparison of the readings that the board has calibrated (`after`) with those of the reference.
 
     - `before`: the recordings of raw readings from which the `calibration` was estimated. They determine the rotation
       between the sensors; without them, `after` does.
