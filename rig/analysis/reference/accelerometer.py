@@ -59,7 +59,7 @@ class ValidationRepeat:
 
 @dataclass(frozen=True, slots=True)
 class AccelerometerResult:
-    """One accelerometer's calibration, a = F (s + φ s²) + b, in the axes of its nominal mounting.
+    """One accelerometer's calibration, reading a = F (s + φ s²) + b of a force s, in the axes of its nominal mounting.
 
     - `movement`: the readings from which the solution is estimated; `sweeps`: the number of sweeps.
     - `triad`: scale and axes, with the solution's uncertainty; `budget`: uncertainty of scale and bias from all causes.
@@ -84,7 +84,7 @@ class AccelerometerResult:
 
     @property
     def correction_matrix(self) -> Array:
-        """The matrix M (3, 3) of s = M (a − b).
+        """The matrix M (3, 3) of the correction s = M (a − b), without the quadratic terms.
 
         M takes readings to the orthogonal frame nearest to the gyroscope's axes, so that corrected rates and
         accelerations share a frame. Without an alignment it is the frame nearest to the accelerometer's own axes.
@@ -115,7 +115,7 @@ class AccelerometerResult:
 def calibrate_accelerometers(
     recordings: Sequence[ObservedRun], settings: RunSettings, gyroscopes: Mapping[str, SensorResult] = NO_GYROSCOPES
 ) -> dict[str, AccelerometerResult]:
-    """Calibrate every sensor whose accelerations were recorded in dwells; align it with its gyroscope.
+    """Return the calibration, and alignment with the gyroscope, of each sensor with accelerations in dwells, by name.
 
     Raise Fault `not_all_attitudes`, `second_order_not_seen`, `swapped_axes`, `mirrored_axis`, `wrong_mounting`, and
     what `solve_imu` and `solve_triaxial` raise.
@@ -133,7 +133,7 @@ def calibrate_accelerometers(
 def _calibrate(
     name: str, recordings: Sequence[ObservedRun], settings: RunSettings, site: Site, gyroscope: SensorResult | None
 ) -> AccelerometerResult:
-    """Calibrate one accelerometer from its dwells and sweeps by maximum likelihood, and compare other methods."""
+    """Return one accelerometer's calibration by maximum likelihood, from dwells and sweeps, and by other methods."""
     sensor = recordings[0].run.sensors[name]
     dwells = tuple(dwell for recording in recordings for dwell in recording.sensors[name].dwells)
     used, left_out = _split_dwells(dwells, _select_planned(dwells, settings))

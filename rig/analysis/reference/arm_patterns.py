@@ -31,7 +31,7 @@ class Posture:
 
 @dataclass(frozen=True, slots=True)
 class StatedArm:
-    """The stated kinematics, the half-width of its angles, and the sensor's nominal mounting (3, 3).
+    """The stated kinematics, the half-width of the errors of its angles, and the sensor's nominal mounting (3, 3).
 
     `estimated_rad`: standard deviation of the wrists' errors, from the readings; it may exceed the stated one.
     """
@@ -52,7 +52,7 @@ def arm_patterns(theta: Array, movement: Movement, postures: Sequence[Posture], 
 
 
 def list_arm_rotations(postures: Sequence[Posture], arm: DenavitHartenberg, mounting: Array) -> Array:
-    """Return the `arm_turns` (18, 3 N + 10 M) of a `Movement`, for an arm with an error of δ = 1."""
+    """Return the `arm_turns` (18, 3 N + 10 M) of a `Movement`, for an arm with attitude errors of 1 rad (std)."""
     rotations: Array = _error_fractions()[:, None] * _stack_rotations(postures, arm, mounting)
     return rotations
 

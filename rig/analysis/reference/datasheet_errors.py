@@ -58,12 +58,18 @@ class Datasheet:
 
     @property
     def even_s2_m(self) -> float:
-        """The half-width of φ without an odd part; up to V = `over_g`, φ v² deviates from its best line by φ V²/2."""
+        """The half-width of the quadratic term φ if it alone is nonlinear.
+
+        Up to the force V = `over_g`, φ v² deviates from its best line by φ V²/2.
+        """
         return 0.02 * self.nonlinearity_percent / (self.over_g * STANDARD_GRAVITY_M_S2)
 
     @property
     def odd_s4_m2(self) -> float:
-        """The half-width of χ without an even part; up to V = `over_g`, χ v³ deviates from its best line by χ V³/4."""
+        """The half-width of the cubic term χ if it alone is nonlinear.
+
+        Up to the force V = `over_g`, χ v³ deviates from its best line by χ V³/4.
+        """
         return 0.04 * self.nonlinearity_percent / (self.over_g * STANDARD_GRAVITY_M_S2) ** 2
 
 

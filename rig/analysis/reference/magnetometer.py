@@ -57,7 +57,7 @@ class MagnetometerResult:
 def calibrate_magnetometers(
     recordings: Sequence[ObservedRun], settings: RunSettings, accelerometers: Mapping[str, AccelerometerResult]
 ) -> Attempts[str, MagnetometerResult]:
-    """Calibrate every recorded magnetometer; return the results, and the Faults of those without one.
+    """Return the calibration of every recorded magnetometer, or its Fault.
 
     The `accelerometers` bound the error of the arm's attitudes. Faults: `no_attitudes` without dwells,
     `field_strength_unknown`, `field_drifts`, `field_not_uniform`, `swapped_axes`, `mirrored_axis`, `wrong_mounting`,
@@ -79,7 +79,7 @@ def _calibrate(
     settings: RunSettings,
     accelerometers: Mapping[str, AccelerometerResult],
 ) -> MagnetometerResult:
-    """Calibrate one magnetometer from its dwells. Raise the Faults of `calibrate_magnetometers`."""
+    """Return one magnetometer's calibration from its dwells. Raise the Faults of `calibrate_magnetometers`."""
     site = settings.site
     if not settings.planned_dwells:
         raise Fault(

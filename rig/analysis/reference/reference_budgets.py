@@ -107,8 +107,8 @@ def _propagate(
 ) -> FitUncertainty:
     """Return the uncertainty of scale and bias, from the `response` (p, n) of all parameters to the readings.
 
-    `noise` (n, n): the readings' covariance; `error`: the attitude error; `chi_square`: χ² of the residuals, and its
-    dof.
+    `noise` (n, n): the readings' covariance; `error`: the attitude error; `chi_square`: χ² of the residuals, and the
+    degrees of freedom of this χ².
     """
     scale = scale_of(solution.matrix)
     rows = scale_and_bias(solution.matrix, scale, len(solution.covariance))
@@ -144,7 +144,7 @@ def lag_pattern(movement: Movement, lag_s: float) -> Array:
 def drift_patterns(matrix: Array, attitudes: Array, drift: FieldDrift | None) -> tuple[Array, float]:
     """Return the patterns (3, 3 N) of a field that changes linearly over the attitudes, and its change in T.
 
-    Each axis of the base has one pattern. The change is a standard uncertainty if the `drift` was tested, else an
+    Each axis of the base has one pattern. If the `drift` was tested, the change is its standard uncertainty, else an
     assumed half-width.
     """
     change_t = UNTESTED_DRIFT_T
