@@ -1,4 +1,4 @@
-"""Biases by repeat, in a run that visits attitudes several times (the paper TRIAX, III-A, III-B, Figs. 4, 6). Pure."""
+"""Biases by repeat, in a run that visits attitudes several times (the paper TRIAX, III-A, III-B, Figs. 4, 6)."""
 
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
@@ -83,10 +83,10 @@ class DwellMean:
 
 
 def estimate_bias_drifts(recordings: Sequence[ObservedRun], settings: RunSettings) -> Drifts:
-    """Return the drift of every sensor to calibrate, over all recordings of a run, by its finished repeats.
+    """Return the drift of every sensor to calibrate, from the finished repeats in all recordings of a run.
 
-    Raise Fault `not_all_attitudes` with fewer than two finished repeats, and what `solve_triaxial` raises for the
-    first.
+    Raise Fault `not_all_attitudes` with fewer than two finished repeats, and what `solve_triaxial` raises for the first
+    repeat.
     """
     site = settings.site
     repeats: defaultdict[int, dict[tuple[float, ...], int]] = defaultdict(dict)

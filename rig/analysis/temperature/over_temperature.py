@@ -1,4 +1,4 @@
-"""Calibrations over temperature: readings are corrected to one temperature by polynomials from repeated poses. Pure.
+"""Calibrations over temperature: readings are corrected to one temperature by polynomials from repeated poses.
 
 The solution that follows is an ordinary calibration, at the reference temperature.
 """
@@ -210,7 +210,7 @@ def _correct_turn(turn: Observation, mean_rad_s: Array, reference_c: float) -> O
 
 
 def _correct_wave(turn: Observation, polynomials: OverTemperature) -> Observation:
-    """Correct mean, cosine and sine of a revolution's accelerations to the reference temperature."""
+    """Return a revolution with its accelerations' mean, cosine and sine corrected to the reference temperature."""
     if turn.acceleration is None:
         return turn
     wave = turn.acceleration.harmonic
