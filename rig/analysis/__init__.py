@@ -1,1 +1,1 @@
-"""From observations to typed results: calibration, verdict, verification, alignment, on-board check. Pure."""
+"""From observations to typed results: calibration, verdict, verification, alignment, on-board check."""

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @solvable()
 def calibrate(runs: "Sequence[RunData]", estimator: str = DEFAULT_ESTIMATOR, *, drifting: bool = False) -> Outcome:
-    """Solve and judge the recordings of a calibration.
+    """Return the outcome of a calibration, whose recordings are solved and judged.
 
     `runs`: at least one recording, of a run or from files. If `drifting`, a bias drift does not count as a
     contradiction. Raise Fault or Refused if the recordings lack something.
@@ -44,7 +44,7 @@ def estimate_bias_drift(runs: "Sequence[RunData]", estimator: str = DEFAULT_ESTI
 
 @solvable()
 def calibrate_by_hand(runs: "Sequence[RunData]") -> Outcome:
-    """Solve and judge the recordings of a session by hand, at least one.
+    """Return the outcome of a session by hand, whose recordings, at least one, are solved and judged.
 
     Raise Fault and Refused as `rig.estimation.by_hand.solution.solve_by_hand` and `collect_inputs` do.
     """
@@ -66,7 +66,7 @@ def verify_calibration(outcome: Outcome, repeated: "Sequence[RunData]") -> Outco
 
 @solvable()
 def verify_stored_calibrations(repeated: "Sequence[RunData]") -> Outcome:
-    """Verify the calibrations stored on the board, by at least one recording of readings corrected by it.
+    """Return the outcome of a verification of the board's stored calibrations, by readings that the board corrected.
 
     Raise Fault as `verify_calibration` does.
     """

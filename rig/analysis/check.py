@@ -1,4 +1,4 @@
-"""One check of the verdict: its name, a measured value and the limit. Pure."""
+"""One check of the verdict: its name, a measured value and the limit. Pure functions."""
 
 import math
 from collections.abc import Iterable, Iterator

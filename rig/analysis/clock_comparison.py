@@ -1,7 +1,7 @@
 """The controller's clock, compared with this computer's clock and the board's crystal.
 
-A speed is 2π over a time of the controller's clock, so every scale factor has that clock's error. No clock is left out:
-each difference is compared with the stated errors of both clocks.
+A speed is 2π over a time of the controller's clock, so every scale factor has that clock's error. No clock is left out.
+The difference of each pair of clocks is compared with the stated errors of both.
 """
 
 from collections.abc import Iterable, Iterator
@@ -117,13 +117,13 @@ def worst_differences(clocks: Iterable[ClockCheck]) -> list[ClockDifference]:
 
 
 def _compare_to_computer(recording: ObservedRun, uncertainty: Uncertainty) -> ClockComparison:
-    """Compare the controller's clock with the computer's, using the arrival times of the states."""
+    """Return the comparison of the controller's clock with the computer's, from the arrival times of the states."""
     rate = compare_with_computer(recording.motion)
     return ClockComparison(COMPUTER_CLOCK, rate.error, uncertainty.computer_clock_ppm * PPM, rate.std, rate.dof)
 
 
 def _compare_to_crystal(recording: ObservedRun, uncertainty: Uncertainty) -> ClockComparison | None:
-    """Compare the controller's clock with the board's counter; None without a board or without a crystal."""
+    """Return the comparison of the controller's clock with the board's counter; None without a board or a crystal."""
     bases = [sensor.time_base for name, sensor in recording.sensors.items() if recording.run.sensors[name].on_board]
     if not bases or recording.run.provenance.board_follows_crystal is False:
         return None

@@ -39,7 +39,8 @@ def find_environment(recordings: Sequence[ObservedRun], settings: RunSettings) -
     """Return the site and the clock comparison of a run.
 
     The recording with the longest motion determines the clock, since all recordings share the controller's quartz. The
-    comparisons of all recordings are kept: they differ if the quartz or the computer's time was changed.
+    comparisons of all recordings are returned too, because they differ if the quartz or the computer's time was
+    changed.
     """
     uncertainty = settings.stated_uncertainty
     longest = max(recordings, key=lambda run: float(run.motion.time_s[-1] - run.motion.time_s[0]))

@@ -1,4 +1,4 @@
-"""Kinds of sensors that packages add, with their own solvers, on an arm or from a file's attitudes. Pure."""
+"""Kinds of sensors that packages add, with their own solvers, on an arm or from a file's attitudes. Pure functions."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

@@ -43,7 +43,7 @@ ResultT = TypeVar("ResultT")
 
 
 def calibrate(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Outcome:
-    """Solve and judge the recordings of a calibration, as in `rig.analysis.analyses.calibrate`."""
+    """Return the outcome of a calibration, as `rig.analysis.analyses.calibrate` describes it."""
     settings = runs[0].settings
     chosen = find_estimator(estimator)
     recordings, mounts = observe_as_mounted(runs, settings)
@@ -123,7 +123,7 @@ def _judge_gyroscopes(
     estimator: Estimator,
     polynomials: "Polynomials",
 ) -> _GyroscopeOutcome:
-    """Solve and judge the gyroscopes of a run: calibration, the board's arithmetic, contradictions and clocks."""
+    """Return the gyroscopes' part of an outcome: calibration, the board's arithmetic, contradictions and clocks."""
     environment = find_environment(recordings, settings)
     results = solve_observed(runs[0].measuring(RATE), recordings, environment, estimator, settings.matrix_corrected)
     if polynomials:
@@ -166,7 +166,7 @@ class _DwellOutcome:
 def _judge_dwells(
     recordings: tuple[ObservedRun, ...], settings: RunSettings, swept: _GyroscopeOutcome, *, drifting: bool
 ) -> _DwellOutcome:
-    """Solve and judge accelerometers and magnetometers from their dwells; gyroscopes are solved already."""
+    """Return the part of an outcome from dwells, of accelerometers and magnetometers; gyroscopes are solved already."""
     from rig.analysis.reference.accelerometer import calibrate_accelerometers
     from rig.analysis.reference.magnetometer import calibrate_magnetometers
 
@@ -200,7 +200,7 @@ def _add_polynomials(
 
 
 def estimate_bias_drift(runs: Sequence[RunData], estimator: str) -> Outcome:
-    """Solve and judge attitudes visited several times, as in `rig.analysis.analyses.estimate_bias_drift`."""
+    """Return the outcome of attitudes visited several times, as `rig.analysis.analyses` describes it."""
     from rig.analysis.temperature.bias_drift import estimate_bias_drifts
 
     outcome = calibrate(runs, estimator, drifting=True)
@@ -215,7 +215,7 @@ def _decision_rule(settings: RunSettings) -> DecisionRule:
 
 
 def verify_calibration(outcome: Outcome, repeated: Sequence[RunData]) -> Outcome:
-    """Verify a calibration by `repeated`, as in `rig.analysis.analyses.verify_calibration`."""
+    """Return the outcome with a verification by `repeated`, as `rig.analysis.analyses` describes it."""
     from rig.analysis.gyroscope.comparison import Reference
     from rig.analysis.gyroscope.verification import verify
 
@@ -281,6 +281,6 @@ def _gravity_effects(
 
 
 def verify_stored(repeated: Sequence[RunData]) -> Outcome:
-    """Verify the board's stored calibrations, as in `rig.analysis.analyses.verify_stored_calibrations`."""
+    """Return the outcome of a verification of stored calibrations, as `rig.analysis.analyses` describes it."""
     nothing_calibrated = Outcome(settings=repeated[0].settings, provenance=origin_of(repeated[:1]))
     return verify_calibration(nothing_calibrated, repeated)

@@ -89,7 +89,7 @@ def look_at(path: Path, stated: ColumnMap | None = None) -> LookedFile:
 
 
 def find_pair(looks: Sequence[LookedFile]) -> tuple[LookedFile | None, LookedFile | None]:
-    """Return the file with the readings, and the one with the attitudes, on the same origin of times; None if none."""
+    """Return the file with readings and the file with attitudes, with one origin of times; None if one is missing."""
     log = next((looked for looked in looks if looked.samples is not None), None)
     reference = _find_reference(looks)
     return log, reference if log is None or reference is None else _count_from(reference, log.origin_s)
@@ -122,7 +122,7 @@ def _count_from(looked: LookedFile, origin_s: int) -> LookedFile:
 def correct_rate_unit(looked: LookedFile, ratio: float) -> LookedFile:
     """Return a file with the gyroscope's unit corrected, if it was guessed by the size of its readings.
 
-    `ratio`: how many times as fast as its readings the gyroscope turned, according to attitudes.
+    `ratio`: the rate that the attitudes show, divided by the gyroscope's reading.
     """
     if (
         looked.layout is None

@@ -38,7 +38,7 @@ class Trial:
 
 
 def try_turns(path: Path, column_map: ColumnMap) -> Trial:
-    """Try to solve a log as one of a sensor turned by hand (`--turns`)."""
+    """Return an attempt to solve a log as one of a sensor turned by hand (`--turns`)."""
     options = {
         "clock_ppm": 50.0,
         "box_rad": float(np.radians(0.2)),
@@ -53,7 +53,7 @@ def try_turns(path: Path, column_map: ColumnMap) -> Trial:
 def try_attitudes(
     path: Path, reference: Path, column_map: ColumnMap, up: str, *, find_clock: bool, sensors: Sequence[str]
 ) -> Trial:
-    """Try to solve all sensors of a log in the attitudes of a reference, or else the gyroscope alone."""
+    """Return an attempt to solve all sensors of a log in the attitudes of a reference, or else the gyroscope alone."""
     files = Files(path, reference, "attitudes", Item("imu"), None, column_map)
     trial = Trial()
     for only in ((), (RATE.sensor,)) if len(sensors) > 1 and RATE.sensor in sensors else ((),):

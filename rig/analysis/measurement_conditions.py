@@ -1,7 +1,7 @@
 """The times and temperatures of the readings from which a calibration is estimated.
 
-A gyroscope's scale factors come from the sweeps alone, its bias from sweeps and rests: if the sensor warms up, these
-refer to different temperatures.
+A gyroscope's scale factors come from the sweeps alone, its bias from sweeps and rests. So if the sensor warms up, scale
+factors and bias refer to different temperatures.
 """
 
 from collections.abc import Iterable, Sequence

@@ -1,4 +1,4 @@
-"""The noise of sensors at rest: the Allan deviation of all rests and dwells, or of another program's log. Pure."""
+"""The noise of sensors at rest: the Allan deviation of all rests and dwells, or of another program's log."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

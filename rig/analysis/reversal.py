@@ -38,7 +38,7 @@ class MagnetometerReversal:
 
 
 def reversals(runs: Sequence[tuple[str, Outcome]]) -> dict[str, MagnetometerReversal]:
-    """Separate bias and field of every magnetometer of the first run, from at least two named runs.
+    """Return bias and field, separated by at least two named runs, of every magnetometer of the first run.
 
     Raise Refused `too_few_runs`, `no_magnetometer` if a run did not record or calibrate a magnetometer of the first
     run, `runs_do_not_match` with the difference, and what `separate` raises.
@@ -63,7 +63,7 @@ def _require_calibrated(run: str, outcome: Outcome, name: str) -> ReversalRun:
 
 
 def _reversal(runs: Sequence[ReversalRun]) -> MagnetometerReversal:
-    """Separate the magnetometer's bias from the arm's field. Raise Refused `runs_do_not_match`."""
+    """Return one magnetometer's bias, separated from the arm's field. Raise Refused `runs_do_not_match`."""
     first = _list_common(runs[0])
     for other in runs[1:]:
         for what, value in _list_common(other).items():

@@ -1,4 +1,4 @@
-"""The calibration of a gyroscope from readings of a body turned by hand on a table. Pure."""
+"""The calibration of a gyroscope from readings of a body turned by hand on a table. Pure functions."""
 
 from rig.analysis.gyroscope.calibration import ALGORITHM_1, NEWTON, SensorResult
 from rig.analysis.gyroscope.correction import Correction, matrix_correction
@@ -17,7 +17,7 @@ NO_SWEEPS = Fault("too_few_observations", "moves by hand are not sweeps", "Give 
 
 
 def solve_hand_samples(item: Item, samples: Samples, columns: Columns) -> SensorResult:
-    """Calibrate the gyroscope from readings, under the stated conditions of the session (`read_conditions`).
+    """Return the gyroscope's calibration from readings, under the stated conditions of the session (`read_conditions`).
 
     Raise Fault and Refused as `rig.estimation.by_hand.solve_by_hand` does, and `stuck_sensor`.
     """

@@ -1,4 +1,4 @@
-"""The prediction of the uncertainty of a session by hand, from simulated readings. Pure.
+"""The prediction of the uncertainty of a session by hand, from simulated readings. Pure functions.
 
 The moves are those of the instructions, made evenly, with the stated standard deviations of a hand's errors.
 """
@@ -62,7 +62,7 @@ def _move_s(move: Instruction) -> float:
 
 
 def _session(sensor: SensorSection, moves: Sequence[Instruction], rest_s: float) -> HandRecording:
-    """Simulate the readings of a session in the sensor's axes, segmented into rests and moves."""
+    """Return the simulated readings of a session in the sensor's axes, segmented into rests and moves."""
     no_rotation, faces = np.zeros(3), [START_FACE, *(move.face for move in moves)]
     spans = [_sample_rotation(rest_s, START_FACE, no_rotation)]
     for face, move in zip(faces, moves, strict=False):

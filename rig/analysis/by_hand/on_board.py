@@ -1,4 +1,4 @@
-"""The comparison of the board's solution of a session by hand with that in double precision. Pure.
+"""The comparison of the board's solution of a session by hand with that in double precision. Pure functions.
 
 The host integrates the same readings by the same equations (`rig.estimation.by_hand.on_board`), with the rests and
 moves that the board reports, so only the arithmetic differs. The calibration's quality is not judged here.
@@ -45,7 +45,7 @@ class HandAgreement:
 def compare_with_board(
     readings: BoardReadings, reports: Sequence[HandReport], solved: BoardHandSolution
 ) -> HandAgreement:
-    """Compare the board's solution with one in double precision on the same readings.
+    """Return how the board's solution agrees with one in double precision from the same readings.
 
     Raise Fault `board_unverified` if readings or reports are missing, `board_disagrees` if the limits are exceeded.
     """
