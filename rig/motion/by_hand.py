@@ -1,4 +1,4 @@
-"""Instructions to turn an item on a table by hand: the side that comes up, or whole turns on one side. Pure.
+"""Instructions to turn an item on a table by hand: the side that comes up, or whole turns on one side. Pure functions.
 
 A face is named by the item's axis that points upwards when that side is up: "+x", "-x", "+y", "-y", "+z", "-z".
 """

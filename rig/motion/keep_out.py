@@ -1,4 +1,4 @@
-"""The distance between the load and the arm itself during a plan. Pure."""
+"""The distance between the load and the arm itself during a plan. Pure functions."""
 
 from collections.abc import Iterator, Sequence
 from math import radians

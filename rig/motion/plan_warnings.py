@@ -1,4 +1,4 @@
-"""Warnings of plans that are possible but probably unintended, shown before the operator agrees. Pure."""
+"""Warnings of plans that are possible but probably unintended, shown before the operator agrees. Pure functions."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The pre-flight check of a plan for any turner: its problems. Pure."""
+"""The pre-flight check of a plan for any turner: its problems. Pure functions."""
 
 import math
 

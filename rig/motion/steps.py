@@ -1,4 +1,4 @@
-"""The steps of a plan: motions with their joints, speed and duration, rests and dwells. Pure."""
+"""The steps of a plan: motions with their joints, speed and duration, rests and dwells. Pure functions."""
 
 import math
 from dataclasses import dataclass
@@ -16,7 +16,10 @@ CLOSURE_TOLERANCE_RAD = 1e-6  # of a whole turn, for rounding
 
 
 class Motion(Protocol):
-    """A joint-space motion. Speed and acceleration are those of the joint that travels farthest; others keep step."""
+    """A joint-space motion, with the speed and acceleration of the joint that travels farthest.
+
+    The other joints start and end at the same times.
+    """
 
     @property
     def name(self) -> str: ...
@@ -148,7 +151,7 @@ class Stage:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """All steps in order. `start_q_rad`: the expected pose at the plan's start; `home_q_rad`: the pose at the end.
+    """All steps of a run in order; `start_q_rad` is the expected pose at the start, `home_q_rad` the pose at the end.
 
     Without `stages` the item's mounting does not change; else it changes before each stage, with the arm at home.
     """

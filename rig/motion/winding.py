@@ -1,4 +1,4 @@
-"""How far a plan winds the flange's cable: each joint's travel below and above the joint's present angle. Pure."""
+"""How far a plan winds the flange's cable: each joint's travel below and above the joint's present angle."""
 
 from collections.abc import Sequence
 from math import ceil, degrees, pi
@@ -18,7 +18,7 @@ def windings_rad(plan: Plan, q_rad: Joints) -> list[tuple[float, float]]:
 
 
 def _round_up_deg(angle_rad: float) -> int:
-    """Round an angle up to whole degrees, but ignore rounding errors: 190 for 190.0000001°."""
+    """Return an angle rounded up to whole degrees, but without rounding errors: 190 for 190.0000001°."""
     return ceil(degrees(angle_rad) - 1e-6)
 
 
