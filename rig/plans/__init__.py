@@ -1,1 +1,1 @@
-"""From a procedure to steps: the motions of the arm, before it moves. Pure."""
+"""Planning: the functions that turn a procedure into the steps of the arm, before it moves."""

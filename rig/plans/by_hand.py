@@ -1,4 +1,4 @@
-"""The wanted moves of a calibration by hand, and the next move to request. Pure.
+"""The wanted moves of a calibration by hand, and the next move to request. Pure functions.
 
 Twelve flips over all six faces determine scale factors and angles between axes best in a given time; whole turns are a
 check that needs no flat table. The order does not matter: the next request follows from the item's face and past moves.

@@ -116,8 +116,8 @@ def _is_corrected(run: RunData) -> bool:
 def _procedure_of(run: RecordedRun, recording: RunData) -> AnyProcedure:
     """Return the procedure of a recording: installed, or defined by the user's own script.
 
-    If neither is available, return an installed procedure for the same kind of readings: a solution needs no script.
-    Raise Refused `another_script` if the script is not that of the recording, and what `kept_script` raises.
+    If neither is available, return an installed procedure for the same kind of readings, because a solution needs no
+    script. Raise Refused `another_script` if the script is not that of the recording, and what `kept_script` raises.
     """
     if _is_by_installed(recording):
         return load_procedures()[recording.settings.procedure]

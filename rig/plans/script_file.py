@@ -66,9 +66,9 @@ def load_script(path: Path) -> ScriptFile:
 def kept_script(folder: Path, kept: ScriptIdentity, named: ScriptFile | None = None) -> ScriptFile:
     """Return the script `kept` in a run folder; the text in the folder is executed only if it is the user's own.
 
-    An installed script is taken from its package. A user who has `named` the same script consents. The text in the
-    folder is the user's own if the user has begun a run with it before. Raise Refused `another_script`,
-    `foreign_script`, and what `load_script` raises.
+    A script that the user has `named` and that has the same text is returned instead. So is an installed script with
+    the same text. The text in the folder is the user's own if the user has begun a run with it before. Raise Refused
+    `another_script`, `foreign_script`, and what `load_script` raises.
     """
     if named is not None:
         if named.sha256 != kept.sha256:

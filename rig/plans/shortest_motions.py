@@ -1,4 +1,4 @@
-"""Candidate motions of the search for the shortest run: sweeps, attitudes, turns of a servo. Pure."""
+"""Candidate motions of the search for the shortest run: sweeps, attitudes, turns of a servo. Pure functions."""
 
 from collections.abc import Iterator, Mapping
 from itertools import product

@@ -1,4 +1,4 @@
-"""The search for the shortest run of a configuration that reaches a target uncertainty. Pure.
+"""The search for the shortest run of a configuration that reaches a target uncertainty. Pure functions.
 
 The order, directions, stages, several speeds and six axes that the file states are kept, and with magnetometers also
 the attitudes.

@@ -7,7 +7,7 @@ from rig.motion.steps import Dwell, Plan, Rest, Sweep, Transfer
 
 
 class Verbs(Protocol):
-    """The methods that a script calls to move the arm and record samples. One that ends early first stops the arm."""
+    """The methods that a script calls to move the arm and record samples; each stops the arm if it ends early."""
 
     @property
     def plan(self) -> Plan:

@@ -21,7 +21,7 @@ def plan_servo_six_observation(
     start_q_rad: Joints | None = None,
     done: Collection[int] = (),
 ) -> Plan:
-    """Plan three or more mountings; in each, the shaft makes a small trial, rests, turns, rests, turns back, rests.
+    """Return the plan: in each of three or more mountings a small trial turn, then a turn, a turn back, and rests.
 
     Each turn is a revolution and `overtravel_deg` more at constant speed, centred on `servo.home_deg`, so that a cable
     winds by slightly more than half a turn in either direction. `start_q_rad` is the shaft's angle (home if None); from

@@ -1,4 +1,4 @@
-"""The shortest round trip through points. Pure."""
+"""The shortest round trip through points. Pure functions."""
 
 import numpy as np
 
@@ -33,7 +33,7 @@ def _nearest_neighbours(between_s: Array, first: int) -> list[int]:
 
 
 def _improve(order: list[int], between_s: Array) -> list[int]:
-    """Improve a tour by 2-opt: reverse the part that shortens the tour most, until no reversal shortens it."""
+    """Return a tour improved by 2-opt: reverse the part that shortens the tour most, until no reversal shortens it."""
     while True:
         starts, ends = np.array(order), np.roll(order, -1)
         durations_s = between_s[starts, ends]

@@ -49,7 +49,7 @@ class Order:
 def plan_six_observation(
     arm: ArmSection, procedure: SixSweepsSection, start_q_rad: Joints | None = None, done: Collection[int] = ()
 ) -> Plan:
-    """Plan the paper's movement (SIX, Section III): each wrist in turn rotates, rests, rotates back, rests.
+    """Return the plan of the paper SIX, Section III: each wrist in turn rotates, rests, rotates back, rests.
 
     With `axes: 6` wrist 1 turns about three more axes, with wrists 2 and 3 turned. With several speeds, all sweeps are
     made at each speed. A sweep turns by `arc_deg` about the home pose, one revolution by default. An order and

@@ -20,7 +20,7 @@ def plan_static_attitudes(
     start_q_rad: Joints | None = None,
     done: Collection[int] = (),
 ) -> Plan:
-    """Plan home, every attitude once in the order that takes the arm least time, `repeats` times, and home again.
+    """Return the plan that visits all attitudes in the fastest order, `repeats` times, and begins and ends at home.
 
     `start_q_rad` is the arm's pose (home if None); from there the plan first goes home slowly. `done`: the indices of
     finished dwells, which are left out. The turner's `problems` checks limits and clearances,

@@ -1,4 +1,4 @@
-"""The effect of a steady drift of the bias on a calibration, from the plan alone. Pure."""
+"""The effect of a steady drift of the bias on a calibration, from the plan alone. Pure functions."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

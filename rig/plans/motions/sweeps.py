@@ -1,4 +1,4 @@
-"""Sweeps of any turner: their course, the transfers between them, and the stages. Pure."""
+"""Sweeps of any turner: their course, the transfers between them, and the stages. Pure functions."""
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace

@@ -17,10 +17,10 @@ def plan_imu(
     start_q_rad: Joints | None = None,
     done: Collection[int] = (),
 ) -> Plan:
-    """Plan all sweeps, home, all attitudes, and home again.
+    """Return the plan of all sweeps, then all attitudes; the arm is at home before, between and after these.
 
-    Sweeps (`plan_six_observation`) are counted first, dwells (`plan_static_attitudes`) after them; `done` holds the
-    indices of either to leave out. Raise Refused `axes_do_not_span`.
+    Sweeps (`plan_six_observation`) are counted first, dwells (`plan_static_attitudes`) after them; `done` are the
+    indices of sweeps and dwells to leave out. Raise Refused `axes_do_not_span`.
     """
     sweeps = plan_six_observation(arm, procedure, start_q_rad, done)
     first = len(plan_six_observation(arm, procedure).sweeps)

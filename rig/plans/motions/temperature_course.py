@@ -1,4 +1,4 @@
-"""The temperatures that a calibration over temperature still lacks. Pure.
+"""The temperatures that a calibration over temperature still lacks. Pure functions.
 
 The sensors go from one end of the range to the other, and back if both directions are wanted. At intervals the arm
 makes a set of sweeps, whose temperature is the mean over the set. Sets with neighbouring temperatures may be at most

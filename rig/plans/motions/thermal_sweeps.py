@@ -22,7 +22,7 @@ def plan_thermal(
     start_q_rad: Joints | None = None,
     done: Collection[int] = (),
 ) -> Plan:
-    """Plan sets of sweeps and attitudes one after the other, at most `procedure.repeats` sets, each from home and back.
+    """Return the plan of at most `procedure.repeats` sets of sweeps and attitudes; each set begins and ends at home.
 
     Before each set the arm rests at home until the temperature is right. A set that is incomplete in `done` is
     repeated, because its sweeps belong to one temperature. Raise Refused `axes_do_not_span`.

@@ -1,4 +1,4 @@
-"""The transfers between measurements, and the approach to home from any pose. Pure."""
+"""The transfers between measurements, and the approach to home from any pose. Pure functions."""
 
 import math
 from collections.abc import Iterable
