@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from rig.analysis.reference.accelerometer import AccelerometerResult
     from rig.analysis.reference.magnetometer import MagnetometerResult
     from rig.analysis.temperature.over_temperature import Polynomials
-    from rig.estimation.temperature.over_temperature import OverTemperature
+    from rig.estimation.temperature.temperature_polynomials import OverTemperature
 
 ResultT = TypeVar("ResultT")
 

@@ -19,7 +19,7 @@ from rig.observation.statistics.mean import Mean
 from rig.observation.windows import Window
 
 if TYPE_CHECKING:
-    from rig.estimation.temperature.over_temperature import OverTemperature
+    from rig.estimation.temperature.temperature_polynomials import OverTemperature
 
 NO_STEPS = Steps(0.0)
 

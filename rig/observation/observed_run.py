@@ -20,7 +20,7 @@ from rig.observation.motion.arm_motion import ArmMotion, motion_of, turner_of
 from rig.observation.observe import SensorObservations, observe_sensor
 
 if TYPE_CHECKING:
-    from rig.estimation.temperature.over_temperature import OverTemperature
+    from rig.estimation.temperature.temperature_polynomials import OverTemperature
 
 NO_ROTATIONS: Mapping[int, Array] = MappingProxyType({})  # every stage is mounted as its settings say
 

@@ -50,7 +50,7 @@ from rig.estimation.reference.reference_model import BIAS as OFFSET
 from rig.estimation.reference.reference_model import F
 from rig.estimation.reference.triaxial import MAX_ATTITUDE_ERROR_RAD
 from rig.estimation.sensor_axes import SensorAxes
-from rig.estimation.temperature.over_temperature import OverTemperature
+from rig.estimation.temperature.temperature_polynomials import OverTemperature
 from rig.observation.clocks.time_base import TimeBase
 from rig.observation.external.attitude_import import average_placements
 from rig.observation.external.csv_import import ExternalData, average_sweeps

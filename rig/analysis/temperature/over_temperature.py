@@ -17,13 +17,12 @@ from rig.data.recording.settings import RunSettings
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.budget import Budget, Contributor
-from rig.estimation.temperature.over_temperature import (
+from rig.estimation.temperature.over_temperature import fit_over_temperature, group_by_input
+from rig.estimation.temperature.polynomial_fits import RepeatedMeans
+from rig.estimation.temperature.temperature_polynomials import (
     OverTemperature,
-    RepeatedMeans,
     TemperatureLine,
     combine_with_reference,
-    fit_over_temperature,
-    group_by_input,
     powers_at,
 )
 from rig.observation.average import Average

@@ -6,7 +6,7 @@ from rig.data.entries.temperature import AtTemperatureEntry, OverTemperatureEntr
 from rig.data.quantity import Quantity
 from rig.data.recording.motion_file import Item
 from rig.data.recording.recorded_sensor import RecordedSensor
-from rig.estimation.temperature.over_temperature import COEFFICIENT_COUNT, OverTemperature, powers_at
+from rig.estimation.temperature.temperature_polynomials import COEFFICIENT_COUNT, OverTemperature, powers_at
 from rig.report.entry import entry, finite_or_none
 
 ROWS = 17  # rows of the table; a certificate shows every fourth

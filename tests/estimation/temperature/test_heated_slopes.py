@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from rig.estimation.arrays import Array
-from rig.estimation.temperature.over_temperature import fit_over_temperature, powers_at
+from rig.estimation.temperature.over_temperature import fit_over_temperature
+from rig.estimation.temperature.temperature_polynomials import powers_at
 from support.motions.heated_course import BIAS_RAD_S, HYSTERESIS_RAD_S, REFERENCE_C, SCALE, repeat_means, warm_board
 
 pytestmark = pytest.mark.slow

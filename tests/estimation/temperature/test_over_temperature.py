@@ -8,7 +8,8 @@ import pytest
 
 from rig.errors import Fault
 from rig.estimation.arrays import Array
-from rig.estimation.temperature.over_temperature import OverTemperature, fit_over_temperature
+from rig.estimation.temperature.over_temperature import fit_over_temperature
+from rig.estimation.temperature.temperature_polynomials import OverTemperature
 from support.motions.warmed_sweeps import (
     FROM_C,
     REFERENCE_C,

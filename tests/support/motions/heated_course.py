@@ -12,7 +12,7 @@ from firmware_host.emulator.parts.drift import Drift
 from rig.config.world.thermal import SimulatedThermalSection
 from rig.data.recording.thermal_events import SetMeasured
 from rig.estimation.arrays import Array
-from rig.estimation.temperature.over_temperature import RepeatedMeans
+from rig.estimation.temperature.polynomial_fits import RepeatedMeans
 from rig.plans.motions.temperature_course import Ramp, TemperatureCourse
 from rig.world.board.heat import HeatedBody
 

@@ -10,12 +10,8 @@ from rig.analysis.external.external_recordings import budget_of, solve_swept
 from rig.analysis.temperature.over_temperature import correct_files
 from rig.data.quantity import RATE
 from rig.estimation.arrays import Array
-from rig.estimation.temperature.over_temperature import (
-    OverTemperature,
-    RepeatedMeans,
-    TemperatureLine,
-    combine_with_reference,
-)
+from rig.estimation.temperature.polynomial_fits import RepeatedMeans
+from rig.estimation.temperature.temperature_polynomials import OverTemperature, TemperatureLine, combine_with_reference
 from rig.observation.average import Average
 from rig.observation.external.csv_import import ExternalData
 from rig.observation.observe import Observation, nearest_axis
