@@ -17,6 +17,8 @@ from rig.data.result_file import ResultDocument
 from support.paths import DOCS
 
 PAGE = DOCS / "names.md"
+# Python gives a name for a type of its own no docstring.
+ALIASES = {"Joints": "A tuple with one value for each joint, beginning with the joint on the ground."}
 DOCUMENTS: dict[str, type[BaseModel]] = {"result.json": ResultDocument, "rig.reversal/1": ReversalDocument}
 
 
@@ -62,7 +64,7 @@ def _python() -> Iterator[str]:
         yield from ("", f"## Names of `{module.__name__}`", "", "| name | meaning |", "| --- | --- |")
         for name in sorted(module.__all__, key=str.lower):
             if name != "__version__":
-                yield f"| `{name}` | {_cell(_first_line(getattr(module, name)))} |"
+                yield f"| `{name}` | {_cell(ALIASES.get(name) or _first_line(getattr(module, name)))} |"
 
 
 def _first_line(named: object) -> str:
