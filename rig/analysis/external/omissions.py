@@ -101,9 +101,11 @@ def notes_on_turns(data: ExternalData, solution: Estimate) -> Iterator[str]:
     """Yield a note if rows with an angle were solved from their mean speed."""
     if not data.by_mean:
         return
-    why = "the body moves before or after them"
+    why = (
+        "the body moves before or after them; so angle_rad must be the angle from start_s to end_s, without these moves"
+    )
     if isinstance(solution, TurnedSolution):
         rows = ", ".join(map(str, data.by_mean))
-        yield f"{len(data.by_mean)} of {len(data.sweeps)} turns count by their mean speed because {why}: rows {rows}"
+        yield f"{len(data.by_mean)} of {len(data.sweeps)} turns, rows {rows}, count by their mean speed: {why}"
     else:
         yield f"all {len(data.sweeps)} turns count by their mean speed: {why}"

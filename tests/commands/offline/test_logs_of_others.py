@@ -237,7 +237,10 @@ def test_turns_that_count_by_their_mean_speed_are_reported(tmp_path: Path, capsy
     cut[2, 5] *= 0.7
     log = type(log)(log.time_s, log.readings, cut)
     said = in_brief(capsys, *_interleave(write_rates(tmp_path, log, None, "angle_rad")))
-    assert "1 of 6 turns count by their mean speed because the body moves before or after them: rows 3" in said
+    assert (
+        "1 of 6 turns, rows 3, count by their mean speed: the body moves before or after them; so angle_rad must"
+        in said
+    )
 
 
 @pytest.mark.one_in(2)  # others of the same size elsewhere: `make proof`
