@@ -60,8 +60,8 @@ def plot_residuals(panels: Sequence[tuple[str, Unexplained]]) -> Plot:
     if not panels:
         raise Refused(
             "nothing_to_plot",
-            "no model of the result has residuals",
-            "The result says why, sensor by sensor",
+            "the result keeps no residual of a sweep, rest, attitude or repeat",
+            "A solution by turned angles keeps none, nor does one that failed; print the result to see which it is",
         )
     figure = _figure(10, 3 * len(panels))
     for axes, (name, unexplained) in zip(figure.subplots(len(panels), squeeze=False)[:, 0], panels, strict=True):

@@ -91,7 +91,7 @@ def test_uncertainties_are_those_of_many_recordings(world: World, thorough: bool
     for each in (errors[:, :3], errors[:, 3:]):
         rms, within = float(np.sqrt(np.mean(each**2))), float(np.mean(np.abs(each) < 2))
         print(f"RMS of error / u {rms:.2f}, {100 * within:.1f} % within U")
-        assert 0.5 < rms < (1.1 if thorough else 1.3)
+        assert 0.4 < rms < (1.1 if thorough else 1.3)
         assert within > (0.93 if thorough else 0.85)
 
 

@@ -12,6 +12,7 @@ import pytest
 import rig
 from rig.cli import main
 from rig.data.result_file import read_result
+from rig.errors import Refused
 from rig.report.certificate.content import certificate_of
 from rig.report.certificate.statements import StatedFacts
 from support.documents.certified import read
@@ -85,10 +86,14 @@ def test_attitudes_are_drawn_and_sweeps_in_the_notebook(kept: tuple[Example, Pat
         np.testing.assert_array_equal(time_s, read["time_s"])
         np.testing.assert_array_equal(rates[:, 0], read["x_rad_s"])
     result = rig.solve(run)
+    if example.samples == "swinging_samples.csv":  # a solution by increments keeps no residual of single rows
+        with pytest.raises(Refused, match="nothing_to_plot"):
+            result.plot()
+        return
     picture = result.plot()
     picture.save(folder / "residuals.png")
     assert {axis.get_title("left").split(":")[0] for axis in picture.figure.axes} >= {
-        f"imu, {kind}" for kind in example.kinds.values() if kind != "gyroscope" or example.samples == "samples.csv"
+        f"imu, {kind}" for kind in example.kinds.values()
     }
 
 
