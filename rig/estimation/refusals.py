@@ -225,7 +225,7 @@ def check_rotations(attitudes: Array) -> None:
 
 
 def check_side(reference: Array, side: Array) -> None:
-    """Raise Fault `sign_unknown` if a direction (3,) nearly perpendicular to v_ref (3,) leaves its sign unknown."""
+    """Raise Fault `sign_unknown` if `side` (3,) is nearly perpendicular to the `reference`, whose sign it must show."""
     if abs(reference @ side) < MIN_SIDE_COSINE * np.linalg.norm(reference) * np.linalg.norm(side):
         direction = ", ".join(f"{part:.2f}" for part in (reference / np.linalg.norm(reference)).tolist())
         raise Fault(

@@ -9,7 +9,7 @@ Pose = tuple[float, ...]  # a controller's pose, (6,): m, rotation vector in rad
 
 @dataclass(frozen=True, slots=True)
 class DenavitHartenberg:
-    """A chain's geometry in rad and m: zero θ, length a, offset d and twist α of n joints, from the ground on.
+    """A chain's Denavit–Hartenberg parameters: zero angle, length, offset and twist of n joints, from the ground on.
 
     Raise ValueError unless all four have the same number of values, at most `MAX_JOINTS`, and all values are finite.
     """

@@ -48,7 +48,10 @@ class WhitenedReference:
     growth: Array
 
     def chi_square_of(self, alternatives: Sequence[Array], nuisance: Sequence[Array]) -> list[float]:
-        """Return the χ² of each alternative, as in `WhitenedModel`; δ is estimated with the likeliest alternative."""
+        """Return the χ² of each alternative, as `WhitenedModel` defines it.
+
+        The arm's attitude error is estimated with the likeliest alternative in the model.
+        """
         model = self._extend_model(nuisance)
         rotated = [self.rotation @ columns for columns in alternatives]
         delta_rad = self._estimate_delta(model)
@@ -63,10 +66,10 @@ class WhitenedReference:
     ) -> Statistic | None:
         """Return the likelihood-ratio statistic of the columns, and the critical value.
 
-        The statistic is twice the logarithm of the ratio, which would be χ² for a given δ. The likelihoods with and
-        without the columns each have their own restricted maximum-likelihood δ (Welham and Thompson, J. R. Stat. Soc. B
-        59 (1997) 701). The larger the part of the variance due to δ, the closer is the critical value to a quantile of
-        F instead of χ². If `columns` is None, the statistic is the χ² of all residuals.
+        The statistic is twice the logarithm of the ratio, which would be χ² for a given attitude error δ of the arm.
+        The likelihoods with and without the columns each have their own restricted maximum-likelihood δ (Welham and
+        Thompson, J. R. Stat. Soc. B 59 (1997) 701). The larger the part of the variance due to δ, the closer is the
+        critical value to a quantile of F instead of χ². If `columns` is None, the statistic is the χ² of all residuals.
         """
         from scipy.special import chdtri
 
@@ -117,11 +120,11 @@ class WhitenedReference:
         return orthonormal_basis(np.column_stack([self.model, *(self.rotation @ columns for columns in nuisance)]))
 
     def _estimate_delta(self, model: Array) -> float:
-        """Return δ from the residuals of the model."""
+        """Return the arm's attitude error, rad, from the residuals of the model."""
         return maximise_likelihood(self.growth, self.residuals, model)[0]
 
     def _whiten_residuals(self, model: Array, delta_rad: float) -> tuple[Array, Array]:
-        """Return the model's basis and residuals, whitened with δ."""
+        """Return the model's basis and residuals, whitened with the attitude error `delta_rad`."""
         size = np.sqrt(1 + delta_rad**2 * self.growth)
         model_basis, residuals = orthonormal_basis(model / size[:, None]), self.residuals / size
         return model_basis, residuals - model_basis @ (model_basis.T @ residuals)
@@ -135,11 +138,11 @@ class WhitenedReference:
         return float(projections @ projections)
 
     def _delta_dof(self, model: Array, delta_rad: float) -> float:
-        """Return the effective degrees of freedom of the estimated δ², from its expected information."""
+        """Return the effective dof of the estimated square of the attitude error, from its expected information."""
         return 2 * information(self.growth, delta_rad, model) * delta_rad**4
 
     def _delta_fraction(self, model: Array, columns: Array, delta_rad: float) -> float:
-        """Return the fraction (0 to 1) due to δ of the variance of residuals projected onto the columns."""
+        """Return the fraction (0 to 1) of the variance of the residuals, along the columns, due to attitude errors."""
         variance = 1 + delta_rad**2 * self.growth
         model_basis, _ = self._whiten_residuals(model, delta_rad)
         projections = remaining_directions(model_basis, columns / np.sqrt(variance)[:, None])

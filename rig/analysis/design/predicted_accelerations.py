@@ -57,7 +57,7 @@ def _budget(accelerometer: PlannedAccelerometer) -> Budget:
 
 
 def _new_fraction(stated: Uncertainty) -> float:
-    """Return the stated fraction of δ² that is independent between dwells, limited to the solver's range."""
+    """Return the stated fraction of the attitude errors' variance that is new in each dwell, within a solvable range."""
     fraction = stated.repeatability_deg**2 / max(
         stated.repeatability_deg**2 + stated.axis_deg**2, np.finfo(np.float64).tiny
     )

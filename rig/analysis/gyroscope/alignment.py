@@ -66,7 +66,7 @@ def collect_mean_rates(observations: Sequence[Observation], calibration: LinearC
 
 
 def fit_rotation(sensor: MeanRates, reference: MeanRates, nominal: Array) -> RelativeRotation:
-    """Return the rotation R that minimises Σ ‖sensor − R reference‖²; `nominal` (3, 3) is R by the nominal mountings.
+    """Return the rotation R that minimises Σ ‖sensor − R reference‖²; `nominal` is R for the nominal mountings.
 
     This is Wahba's problem, solved by SciPy (Kabsch 1976). For an error δθ of R and a rate r of the reference, the
     sensor reads R r + δθ × R r to first order, so the standard deviation of δθ is that of a linear least-squares

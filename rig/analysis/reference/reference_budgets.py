@@ -66,7 +66,7 @@ def accelerometer_budget(
 def combine_errors(
     spread: FitUncertainty, theta: Array, movement: Movement, site: Site, lag_s: float, *, datasheet: Datasheet | None
 ) -> Budget:
-    """Return the budget of scale and bias from a fit's uncertainty, `spread`; θ (22,) is the `movement`'s solution."""
+    """Return the budget of scale and bias from the uncertainty `spread` of a fit with the solution `theta` (22,)."""
     others = [_lag(spread, movement, lag_s)] if len(movement.sweeps.speeds_rad_s) else []
     if movement.sensor_errors is None or datasheet is None:
         return reference_budget(spread, _gravity(site), others)
@@ -134,7 +134,7 @@ def _field(site: Site, field_t: float) -> NormUncertainty:
 
 
 def lag_pattern(movement: Movement, lag_s: float) -> Array:
-    """Return the pattern (1, 3 K) of the sensor's filter, which reduces a sweep's wave by a fraction (ω `lag_s`)²/2."""
+    """Return the pattern (1, 3 K) of the sensor's filter, which reduces a sweep's wave by (speed × `lag_s`)²/2."""
     dwells, sweeps = movement.dwells, movement.sweeps
     smaller = sweeps.harmonics_m_s2 * np.square(sweeps.speeds_rad_s * lag_s)[:, None, None] / 2
     smaller[:, 0] = 0.0  # the mean is not reduced

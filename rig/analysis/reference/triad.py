@@ -81,7 +81,7 @@ def check_mounted(matrix: Array) -> None:
 
 
 def check_identifiable(second_order: Array, std: Array, remedy: str) -> None:
-    """Raise Fault `second_order_not_seen` unless a term of φ (3,) is significant by its `std` (3,)."""
+    """Raise Fault `second_order_not_seen` unless one of the quadratic terms (3,) is significant given its `std`."""
     largest = float(np.max(np.abs(second_order) / std))
     if largest < MIN_SECOND_ORDER_STDS:
         raise Fault(

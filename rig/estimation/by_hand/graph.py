@@ -258,9 +258,10 @@ def _move(graph: Graph, row: int) -> Factor:
 
 
 def _tilt_factor(graph: Graph, row: int) -> Factor:
-    """Return the factor of a turn by α about a face's normal n.
+    """Return the factor of a turn by an angle α about a face's normal n.
 
-    Its two rows are the components perpendicular to F n of the equation ∫(reading − b) dt / α = F n.
+    Its two rows are the components perpendicular to F n of the equation ∫(reading − b) dt / α = F n, with the
+    gyroscope's matrix F and bias b.
     """
     normal, matrix = graph.faces.up[row], graph.state.matrix
     integral_rad, duration_s = graph.integrals.swept_rad[row], graph.integrals.durations_s[row]
@@ -371,6 +372,6 @@ def _priors(graph: Graph) -> Iterator[Factor]:
 
 
 def _skew(vector: Array) -> Array:
-    """Return the matrix (3, 3) that takes δ to vector × δ."""
+    """Return the matrix (3, 3) whose product with any vector is the cross product of `vector` with it."""
     x, y, z = vector.tolist()
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

@@ -29,9 +29,10 @@ def six_observation_bound(scale: ArrayLike, rates_rad_s: ArrayLike, variances_ra
 
 
 def vector_matrix_bound(rates_rad_s: ArrayLike, variances_rad2_s2: ArrayLike) -> Array:
-    """Return the Cramér–Rao bound (12, 12) for the rows of F, then the offset c, of the readings F ω + c.
+    """Return the Cramér–Rao bound (12, 12) for a gyroscope's matrix F, row by row, and its offset c.
 
-    `rates_rad_s` ω (N, 3) may be zero.
+    The readings are F ω + c, with the rates `rates_rad_s` ω (N, 3), which may be zero, and the noise
+    `variances_rad2_s2`.
     """
     rates, variances = (np.asarray(a, dtype=np.float64) for a in (rates_rad_s, variances_rad2_s2))
     design = np.concatenate([rates, np.ones((len(rates), 1))], axis=1)
@@ -62,10 +63,11 @@ def triaxial_bound(
     known_references: ArrayLike | None = None,
     second_order: ArrayLike | None = None,
 ) -> Array:
-    """Return the Cramér–Rao bound (15, 15) of F by rows, v_ref and b; (18, 18) if `second_order` φ (3,) is given.
+    """Return the Cramér–Rao bound (15, 15) of `matrix`, row by row, `reference` and `bias`.
 
-    The model is Eqs. (3) and (10) of the paper TRIAX. The arguments are true values, in the shapes of `solve_triaxial`.
-    `known_references` (N, 3) are v̄, the table's own motion; without them the norm of `reference` counts as known.
+    The bound is (18, 18) if `second_order` (3,) is given. The model is Eqs. (3) and (10) of the paper TRIAX. The
+    arguments are true values, in the shapes of `solve_triaxial`. `known_references` (N, 3) are the table's own motion;
+    without them the norm of `reference` counts as known.
     """
     parts = [np.ravel(matrix), np.asarray(reference), np.asarray(bias)]
     if second_order is not None:

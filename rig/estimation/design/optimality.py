@@ -61,9 +61,9 @@ def g_efficiency(directions: ArrayLike, model: Model = "squared") -> float:
 def c_efficiency(directions: ArrayLike, what: Literal["scale", "bias"] = "scale") -> float:
     """Return the c-efficiency of sweeps for the scale factors, or the biases: 1 at best, 0 for a singular design.
 
-    The criterion is Elfving's c-optimality: the variance N cᵀ(XᵀX)⁻¹c of one combination cᵀβ of parameters, here that
-    of the worst axis. The squares of a direction's components add up to 1, so the worst variance is at least 3 for a
-    scale factor and 1 for a bias.
+    The criterion is Elfving's c-optimality: the variance N cᵀ(XᵀX)⁻¹c of one combination of the parameters, with the
+    coefficients c and the design X; here it is the variance of the worst axis. The squares of a direction's components
+    add up to 1, so the worst variance is at least 3 for a scale factor and 1 for a bias.
     """
     features = _features(directions, "vector")
     if np.linalg.matrix_rank(features) < PARAMETER_COUNT["vector"]:

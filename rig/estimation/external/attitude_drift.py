@@ -105,7 +105,7 @@ class DriftState:
     clock_s: float
 
     def after_step(self, theta: Array) -> "DriftState":
-        """Return the state after a step θ."""
+        """Return the state after a step `theta` of all parameters."""
         matrix = self.matrix + theta[MATRIX].reshape(3, 3)
         return DriftState(matrix, self.bias + theta[BIAS], self.clock_s + float(theta[CLOCK]))
 
@@ -114,8 +114,10 @@ class DriftState:
 class FixedAttitudes:
     """The terms of the module's equation at N fixes and at k samples.
 
-    At the fixes: `attitudes` E (N, 3, 3), `sensitivities` S (N, 3, 12), `turning` C ω (N, 3), and the times `middles_s`
-    (N,), `windows_s` (N, 2). At the samples: `samples` E (k, 3, 3), `rates` C ω (k, 3).
+    - `attitudes` (N, 3, 3), `samples` (k, 3, 3): the reference's attitude E relative to the gyroscope's.
+    - `sensitivities` (N, 3, 12): derivatives S of the gyroscope's attitude with respect to F and b.
+    - `turning` (N, 3), `rates` (k, 3): the rate C ω at the fixes, and at the samples.
+    - `middles_s` (N,), `windows_s` (N, 2): middle, and start and end, of each fix.
     """
 
     attitudes: Array

@@ -128,9 +128,9 @@ class IncrementSolution:
 
 @refusals.convergence_required()
 def solve_known_increments(time_s: Array, readings: Array, fixes: Fixes, start: DriftState) -> IncrementSolution:
-    """Estimate a gyroscope's matrix and bias from readings (n, 3) in rad/s at times (n,), without outlying increments.
+    """Return a gyroscope's matrix and bias from readings (n, 3) in rad/s at times (n,), without outlying increments.
 
-    `start` holds the initial values of F, b and τ. Raise Fault `rank_deficient`, `ill_conditioned`,
+    `start` holds the initial values of matrix, bias and clock. Raise Fault `rank_deficient`, `ill_conditioned`,
     `attitude_untrustworthy`, `clocks_apart`, `wrong_unit`, `mirrored_axis`.
     """
     recorded = AttitudeSamples(time_s, readings, fixes, np.ones(len(fixes.at_s), dtype=np.bool_))
@@ -305,7 +305,7 @@ def _build_result(settled: _ConvergedFit, aside_s: Array) -> IncrementSolution:
 
 
 def _widen_by_axes(settled: _ConvergedFit, wanted: Array, covariance: Array) -> Array:
-    """Return the covariance (q, q) that inclined axes of the reference add to the combinations `wanted` (q, p) of θ."""
+    """Return the covariance (q, q) that inclined axes of the reference add to combinations `wanted` of parameters."""
     inclinations = find_inclinations(settled.averaged, settled.fixes, settled.state.matrix)
     return inclinations.widen(settled.model, settled.std, settled.solved, wanted, np.diag(covariance))
 
@@ -319,7 +319,7 @@ CAUSES_OF_CONTRIBUTOR = {
 
 
 def _causes(settled: _ConvergedFit) -> dict[str, Array]:
-    """Return the parts of θ's covariance: one for each estimated error, and one for θ's priors."""
+    """Return the parts of the parameters' covariance: one for each estimated error, and one for the priors."""
     covariance = settled.solved.covariance
     blind, *parts, _ = settled.model.causes(settled.std, settled.solved)
     by_cause = dict(zip(settled.causes.causes, parts, strict=True))

@@ -29,9 +29,10 @@ UNKNOWN_ATTITUDE_STD_RAD = 1.0
 
 @dataclass(frozen=True, slots=True)
 class PlacementSolution:
-    """The parameters θ (p,), estimated with placement errors; θ's covariance (p, p) is the sum of its named `causes`.
+    """The parameters `theta` (p,), estimated with placement errors; their covariance is the sum of named `causes`.
 
-    `placement_std` is ζ in the unit of the readings, with its `placement_uncertainty`; `attitude_error` is δ.
+    `placement_std` is the std of the placement errors in the unit of the readings, with its `placement_uncertainty`;
+    `attitude_error` is that of the attitudes.
     """
 
     theta: Array
@@ -56,8 +57,8 @@ class _LinearisedPlacements:
     """The linearised readings of N placements.
 
     - residuals (N, 3): readings minus model; variances (N, 3) of their noise.
-    - design (N, 3, q): derivatives of the readings with respect to q free directions of θ.
-    - turned (N, 3, 3): E, the effects of a small rotation; std_rad (N,): the attitudes' stated standard deviations.
+    - design (N, 3, q): derivatives of the readings with respect to q free directions of the parameters.
+    - turned (N, 3, 3): the effects of a small rotation; std_rad (N,): the attitudes' stated standard deviations.
     """
 
     residuals: Array
@@ -67,7 +68,10 @@ class _LinearisedPlacements:
     std_rad: Array
 
     def fits(self, delta: float, zetas: Array) -> "_PlacementFits":
-        """Return a fit, by one Gauss–Newton step, for the attitude error `delta` and each placement error `zetas`."""
+        """Return the fits after one Gauss–Newton step with attitude errors of std `delta`.
+
+        There is one fit for each of `zetas` (k,), the std of the placement errors.
+        """
         tilts = self.turned * np.hypot(self.std_rad, delta)[:, None, None]
         errors = {
             NOISE: np.eye(3) * self.variances[:, :, None],
@@ -95,7 +99,10 @@ class _LinearisedPlacements:
 
 @dataclass(frozen=True, slots=True)
 class _PlacementFits:
-    """The fits for k placement errors ζ: steps (k, q) of θ, covariances (k, q, q) by cause, log-likelihoods (k,)."""
+    """The fits for k sizes of the placement errors.
+
+    `steps` (k, q) of the parameters, their covariances (k, q, q) by the `causes`, and the log-likelihoods (k,).
+    """
 
     steps: Array
     causes: dict[str, Array]
@@ -168,9 +175,10 @@ def _relate_errors(laid: PlacementSolution, all_rests: AttitudeReadings, stated:
 
 
 def _find_log_prior(grid: Array, size: float) -> Array:
-    """Return the log density (n,) of ln δ and ln ζ at `grid` (n, 2): uniform in δ, half-Cauchy in ζ.
+    """Return the log prior density (n,) of the logarithms `grid` (n, 2) of two standard deviations.
 
-    `size` is the norm of the reference.
+    The density is uniform in the first, that of attitude errors, and half-Cauchy in the second, that of placement
+    errors. `size` is the norm of the reference.
     """
     delta, zeta = grid.T
     log_prior: Array = np.log(delta) + np.log(zeta) - np.log1p((zeta / (ERROR_MEDIAN_RATIO * size)) ** 2)

@@ -25,7 +25,8 @@ ERROR_MEDIAN_RATIO = 1e-3  # of η to the reference (a milli-g)
 def build_placement_model(theta: Array, placed: AttitudeReadings, stated: int) -> MixedModel:
     """Return the model of N placements, linear in the free directions of `theta` (p,).
 
-    Only the first `stated` placements have a measured attitude and therefore an error γ. The components are ε, γ and η.
+    The components are the errors ε, γ and η of the module. Only the first `stated` placements have a measured attitude
+    and therefore an error γ.
     """
     attitudes, count = placed.attitudes, len(placed.readings)
     free, alone = free_directions(theta, norm_known=placed.norm_known), np.eye(count)

@@ -104,8 +104,8 @@ class Accumulator:
     def solve(self, estimator: SixObservationEstimator = "newton") -> Solution:
         """Return scale factors and biases with their covariance.
 
-        `newton` centres the readings on their mean, which is about −b, because without centring the design of the
-        paper's Eq. (7) is singular if ‖K b‖ = ω. `algorithm_1` uses uncentred readings, as published. Raise Fault
+        `newton` subtracts their mean from the readings first, because otherwise the design of the paper's Eq. (7) is
+        singular if the scaled bias is as large as the speed. `algorithm_1` uses the readings as published. Raise Fault
         `too_few_observations`, `rank_deficient`, `negative_square`, `algorithm_1_diverged`, `wrong_unit`.
         """
         check_count(self.count, 6, 6)
@@ -145,11 +145,11 @@ class Accumulator:
         return rank, condition, int(np.argmax(weakest[:3] + weakest[3:]))
 
     def _covariance(self, scale: Array, bias: Array, centre: Array) -> Array:
-        """Return the covariance (6, 6) to first order in the errors e of the means.
+        """Return the covariance (6, 6) of scale and bias, to first order in the errors e of the equations.
 
         β of `six_observation` changes by δβ = (XᵀW X + XᵀW 1 ∂Γ/∂β)⁻¹ XᵀW e. X has the rows x, W the weights, 1 is a
-        column of ones, and Γ(β) = β0. k and b follow from β. `bias` (3,) is that of the readings minus `centre` (3,);
-        the covariance does not depend on the centre.
+        column of ones, and Γ(β) = β0. Scale and bias follow from β. `bias` (3,) is that of the readings minus `centre`
+        (3,); the covariance does not depend on the centre.
         """
         translation = _translation(centre)[:6]
         powers = np.stack([(bias - centre) ** 2, 2 * (bias - centre), np.ones(3)], axis=1) * 4 * scale[:, None] ** 4

@@ -168,7 +168,7 @@ def _integrate_block(interval: _Interval, at_s: Array, inverse: Array) -> tuple[
 
 @dataclass(frozen=True, slots=True)
 class _IncrementSteps:
-    """Steps that begin at readings: rotation vectors φ (k, 3), integrals (k, 3) of the rate, durations (k, 1)."""
+    """Steps that begin at readings: rotation vectors (k, 3), integrals (k, 3) of the rate, durations (k, 1)."""
 
     vectors: Array
     integrals_rad: Array
@@ -177,8 +177,8 @@ class _IncrementSteps:
     def differentiate(self, inverse: Array) -> Array:
         """Return the derivatives (k, 3, 3) of the steps' rotations by the integrated error of the readings.
 
-        The rotation is in body coordinates at the start. The attitude half-way is used for the whole step, which causes
-        an error of about φ²/24.
+        The rotation is in body coordinates at the start. The attitude half-way is used for the whole step, which for a
+        step by the angle φ causes a relative error of about φ²/24.
         """
         return np.asarray(-_matrices(self.vectors / 2) @ inverse, dtype=np.float64)
 
@@ -222,7 +222,7 @@ def _matrices(vectors: Array) -> Array:
 
 
 def _running_product(vectors: Array) -> Array:
-    """Return the running products I, exp(φ₁), exp(φ₁) exp(φ₂), … (n + 1, 3, 3), computed √n rows at a time."""
+    """Return the attitudes (n + 1, 3, 3) after 0, 1, … n rotations by `vectors`, computed √n rows at a time."""
     width = int(np.ceil(np.sqrt(len(vectors))))
     padded = np.zeros((width * width, 3))
     padded[: len(vectors)] = vectors

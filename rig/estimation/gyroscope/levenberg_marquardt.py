@@ -117,12 +117,12 @@ def _conditioning(unit_means: Array, noise: float) -> refusals.Conditioning:
 
 
 def compute_squared_rate(theta: Array, means: Array) -> Array:
-    """Return ‖K (m + b)‖² (N,) of mean readings (N, 3) for θ = [k b] (6,), the paper's Eqs. (1), (2)."""
+    """Return ‖K (m + b)‖² (N,) of mean readings m (N, 3) for `theta` = [k b] and K = diag(k); Eqs. (1), (2) of SIX."""
     return np.asarray(np.sum((theta[:3] * (means + theta[3:])) ** 2, axis=-1), dtype=np.float64)
 
 
 def compute_squared_rate_jacobian(theta: Array, means: Array) -> Array:
-    """Return the derivative (N, 6) of `compute_squared_rate` with respect to k and b."""
+    """Return the derivative (N, 6) of `compute_squared_rate` with respect to `theta`."""
     k, shifted = theta[:3], means + theta[3:]
     return np.concatenate([2 * k * shifted**2, 2 * k**2 * shifted], axis=-1)
 

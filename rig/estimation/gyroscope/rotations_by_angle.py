@@ -103,7 +103,7 @@ class TurnedSolution:
 
 @dataclass(frozen=True, slots=True)
 class _ObservationEquations:
-    """The equations `observed` (r,) = `design` (r, 12) δθ + errors.
+    """The equations `observed` (r,) = `design` (r, 12) × step + errors, for a step of matrix F and offset c.
 
     Each of the `causes` of errors is an array (r, q) of q patterns, each for one standard deviation of an error.
     """
@@ -126,7 +126,7 @@ class _ObservationEquations:
 
 @dataclass(frozen=True, slots=True)
 class _TurnsEstimate:
-    """An iterate of the solution, m = F ω + c."""
+    """An iterate of the solution: matrix F (3, 3) and offset c (3,) of reading = F × rate + c."""
 
     matrix: Array
     offset: Array
@@ -242,7 +242,7 @@ def _equate_rotation(
 
 
 def _derive(rate: Array, rows: Array) -> Array:
-    """Return the derivative (r, 12) of `rows` (r, 3) · (F ω + c) with respect to F and c."""
+    """Return the derivative (r, 12) of `rows` (r, 3) · (F `rate` + c) with respect to F, row by row, and c."""
     return np.asarray(np.hstack([np.kron(rows, rate), rows]), dtype=np.float64)
 
 
@@ -252,7 +252,7 @@ def _perpendicular_axes(axis: Array) -> Array:
 
 
 def _solve(equations: Sequence[_ObservationEquations]) -> tuple[Array, Array]:
-    """Return the least-squares step δθ (12,) and its covariance."""
+    """Return the least-squares step (12,) of matrix, row by row, and offset, and its covariance."""
     information, gradient = np.zeros((12, 12)), np.zeros(12)
     for equation in equations:
         weighted = equation.design.T @ np.linalg.inv(equation.covariance)

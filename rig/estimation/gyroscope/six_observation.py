@@ -40,7 +40,7 @@ def closed_form(means_rad_s: Array, speed_rad_s: float) -> tuple[Array, Array]:
     """Return scale (3,) and bias (3,) from exactly six mean readings (6, 3) at one speed by one linear solve.
 
     In this module's notation, at one speed p = ω² q, and γ = ω² Γ / (1 + Γ) with Γ = Σ q_l² / (4 q_s). The design is
-    not checked; `Accumulator.solve` does that. Raise Fault `rank_deficient`, `negative_square`.
+    not checked, unlike in `Accumulator.solve`. Raise Fault `rank_deficient`, `negative_square`.
     """
     square = speed_rad_s * speed_rad_s
     q = solve_linear(design(means_rad_s), np.ones(6))
@@ -48,10 +48,10 @@ def closed_form(means_rad_s: Array, speed_rad_s: float) -> tuple[Array, Array]:
 
 
 def solve_by_newton(p: Array, q: Array, square_rad2_s2: float) -> tuple[Array, int]:
-    """Return β (6,) = p − γ q, with γ = Γ(β) found by Newton's method, and the number of steps.
+    """Return the module's β (6,) = p − γ q, with γ = Γ(β) by Newton's method, and the number of steps.
 
-    The first γ is the closed form for the mean squared speed (rad²/s²), which is exact if all speeds are equal.
-    From there the iteration converges for any bias. Raise Fault `negative_square`.
+    The first γ is the closed form for the mean squared speed (rad²/s²), which is exact if all speeds are equal. From
+    there the iteration converges for any bias. Raise Fault `negative_square`.
     """
     ps, qs = p.tolist(), q.tolist()
     gamma = _gamma_at_one_speed(qs, square_rad2_s2)
@@ -73,7 +73,7 @@ def solve_by_newton(p: Array, q: Array, square_rad2_s2: float) -> tuple[Array, i
 
 
 def solve_by_algorithm_1(p: Array, q: Array) -> tuple[Array, int]:
-    """Return β (6,) and the number of passes by the paper's Algorithm 1, as published.
+    """Return the module's β (6,) and the number of passes by the paper's Algorithm 1, as published.
 
     β ← (XᵀX)⁻¹Xᵀ(ω² − γ) = p − γ q and γ ← Γ(β), beginning with γ = 0, until Σ|Δβ| ≤ 10⁻⁶; the first β is pass 1. Each
     pass shrinks the step by β0 / (ω² − β0), so it converges only for β0 < ω²/2 (at 1 rad/s this is the paper's "β0 <
@@ -97,7 +97,10 @@ def solve_by_algorithm_1(p: Array, q: Array) -> tuple[Array, int]:
 
 
 def extract_parameters(beta: Array) -> tuple[Array, Array]:
-    """Return k = √β_s and b = β_l / (2 β_s), (3,) each (Algorithm 1). Raise Fault `negative_square`."""
+    """Return scale k = √β_s and bias b = β_l / (2 β_s), (3,) each, from `beta` β: squares β_s, then linear terms β_l.
+
+    Raise Fault `negative_square`.
+    """
     squares = beta[:3]
     for s, square in enumerate(squares.tolist()):
         if not square > 0:
@@ -123,7 +126,7 @@ def rank_deficient(axis: str) -> Fault:
 
 
 def _gamma_at_one_speed(q: list[float], square: float) -> float:
-    """Return γ = ω² Γ / (1 + Γ) of sweeps at one speed, as in `closed_form`. Raise Fault `negative_square`."""
+    """Return the module's γ for sweeps at one speed, as `closed_form` defines it. Raise Fault `negative_square`."""
     total = 0.0
     for s in range(3):
         if q[s] == 0:

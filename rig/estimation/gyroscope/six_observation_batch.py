@@ -24,10 +24,9 @@ class BatchSolution:
 
 
 def newton_batch(means_rad_s: ArrayLike, speeds_rad_s: ArrayLike) -> BatchSolution:
-    """Return the solutions of all runs: the closed form, then Newton steps on γ if speeds differ (`solve_by_newton`).
+    """Return the solutions of all runs: the closed form, then Newton steps if speeds differ (`solve_by_newton`).
 
-    The linear solution β = p − γ q depends on the unknown γ = Σ k² b². The means are (R, N, 3), the speeds (N,) or (R,
-    N).
+    The means are (R, N, 3), the speeds (N,) or (R, N).
     """
     means = np.asarray(means_rad_s, dtype=np.float64)
     centre = means.mean(axis=1)
@@ -80,7 +79,7 @@ def algorithm_1_batch(means_rad_s: ArrayLike, speeds_rad_s: ArrayLike) -> BatchS
 
 
 def _responses(means: Array, speeds_rad_s: ArrayLike) -> tuple[Array, Array, Array]:
-    """Return p = X⁺ω² and q = X⁺1, (R, 6) each, and the mean squared speed (R,)."""
+    """Return p and q of `six_observation`, (R, 6) each, and the mean squared speed (R,)."""
     runs, count, _ = means.shape
     x = design(means)
     square = np.broadcast_to(np.asarray(speeds_rad_s, dtype=np.float64) ** 2, (runs, count))

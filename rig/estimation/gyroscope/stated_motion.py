@@ -61,9 +61,10 @@ class StatedMotion:
 
 @dataclass(frozen=True, slots=True)
 class MotionErrors:
-    """The posterior distribution of the standard deviations ρ and α of errors of the stated motion.
+    """The posterior distribution of the standard deviations of two errors of the stated motion.
 
-    `rate` (G,) and `axis_rad` (G,) are pairs (ρ, α), `weights` (G,) their posterior probabilities.
+    `rate` (G,), the relative error of rates, and `axis_rad` (G,), the tilt of axes, are pairs of standard deviations;
+    `weights` (G,) are the posterior probabilities of the pairs.
     """
 
     rate: Array
@@ -72,14 +73,14 @@ class MotionErrors:
 
     @property
     def median_variances(self) -> tuple[float, float]:
-        """The squares of the posterior medians of ρ and α."""
+        """The squares of the posterior medians of `rate` and `axis_rad`."""
         return _median(self.rate**2, self.weights), _median(self.axis_rad**2, self.weights)
 
     def expanded(self, fixed: Array, of_rate: Array, of_axis: Array) -> Array:
-        """Return the expanded uncertainties U (q,), at 95.45 %, of q values, over all pairs (ρ, α).
+        """Return the expanded uncertainties U (q,), at 95.45 %, of q values, over all pairs of standard deviations.
 
-        For given ρ and α the values have a normal distribution. `fixed` (q,) are the variances that do not depend on
-        them, `of_rate` and `of_axis` (q,) the variances per ρ² and per α².
+        For a given pair the values have a normal distribution. `fixed` (q,) are the variances that do not depend on the
+        pair, `of_rate` and `of_axis` (q,) the variances for `rate` = 1 and `axis_rad` = 1.
         """
         from scipy.special import ndtr
 
@@ -96,7 +97,7 @@ class MotionErrors:
 
 
 def motion_errors(motion: StatedMotion) -> MotionErrors:
-    """Return the posterior distribution of ρ and α from the residuals of sweeps and rests."""
+    """Return the posterior distribution of the stated motion's errors, from the residuals of sweeps and rests."""
     smallest = min(MIN_NOISE_RATIO * motion.relative_noise, MAX_ERROR / 10)
     sizes = np.geomspace(smallest, MAX_ERROR, GRID_POINTS)
     prior = -np.log(np.maximum(sizes / PRIOR_KNEE_ERROR, 1.0))
@@ -110,7 +111,7 @@ def motion_errors(motion: StatedMotion) -> MotionErrors:
 
 
 def _likelihoods(motion: StatedMotion, axis_rad: float, rates: Array) -> Array:
-    """Return the restricted log-likelihoods (k,) of the values `rates` (k,) of ρ, for α = `axis_rad`.
+    """Return the restricted log-likelihoods (k,) of the stds `rates` (k,) of rate errors, for the axis' std `axis_rad`.
 
     A rate error changes the covariance of a sweep by one dyad, so each inverse has a rank-one update (Sherman and
     Morrison, Ann. Math. Stat. 21 (1950) 124).

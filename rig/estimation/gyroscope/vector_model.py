@@ -105,7 +105,7 @@ def solve_vector_model(
     nominal_mounting: ArrayLike | None = None,
     shared_covariance_rad2_s2: ArrayLike | None = None,
 ) -> VectorSolution:
-    """Solve m = F ω + c (+ G a) by weighted least squares.
+    """Return the solution of the vector model, m = F ω + c (+ G a), by weighted least squares.
 
     - `means_rad_s`, `variances_rad2_s2` (N, 3): mean readings and the variances of these means.
     - `rates_rad_s` (N, 3): the mean rate in the flange frame, zero for a rest.

@@ -15,7 +15,7 @@ MODEL = "a_m = F (s + φ s²) + b, s = −Rᵀ g"
 
 
 def specific_force(readings_m_s2: ArrayLike, matrix: Array, bias_m_s2: Array, second_order_s2_m: Array | None) -> Array:
-    """Return the specific force s (…, 3): the root of smaller size of φ s² + s = F⁻¹ (a_m − b), with readings a_m."""
+    """Return the specific force s (…, 3) of readings a_m: the root of smaller size of φ s² + s = F⁻¹ (a_m − b)."""
     linear = (np.asarray(readings_m_s2, dtype=np.float64) - bias_m_s2) @ np.linalg.inv(matrix).T
     if second_order_s2_m is None:
         return np.asarray(linear, dtype=np.float64)

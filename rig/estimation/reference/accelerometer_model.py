@@ -157,7 +157,7 @@ class Movement:
 
 
 def predicted(theta: Array, movement: Movement) -> Array:
-    """Return the readings (K, 3) that the model predicts for θ."""
+    """Return the readings (K, 3) that the model predicts for the parameters `theta`."""
     s = find_force(theta, movement)
     readings: Array = (s + theta[SECOND] * _product(s, s, movement)) @ matrix(theta).T
     return readings + movement.constant()[:, None] * theta[BIAS]
@@ -171,7 +171,7 @@ def find_force(theta: Array, movement: Movement) -> Array:
 
 
 def project_reference(delay_s: float, movement: Movement) -> Array:
-    """Return the matrices (K, 3, 3) that map v_ref to the specific force that it causes."""
+    """Return the matrices (K, 3, 3) that map the reference v_ref (3,) to the specific force that it causes."""
     sweeps = movement.sweeps
     to_flange = np.swapaxes(sweeps.attitudes, -1, -2)
     parallel = sweeps.axes_flange[:, :, None] * sweeps.axes_flange[:, None, :]
@@ -202,7 +202,10 @@ def project_lever_arm(delay_s: float, movement: Movement) -> Array:
 
 
 def _around_axes(turning_rad2_s2: Array, movement: Movement) -> Array:
-    """Return the matrices (K, 3, 3) from lever arm to acceleration for harmonics of ω² and α (M, 2, 3) of sweeps."""
+    """Return the matrices (K, 3, 3) from lever arm to acceleration; `turning_rad2_s2` (M, 2, 3) are ω² and α in sweeps.
+
+    ω is the angular rate and α the angular acceleration, given by their mean, cosine and sine over the joint's angle.
+    """
     axes = movement.sweeps.axes_flange
     centripetal, euler = axes[:, :, None] * axes[:, None, :] - np.eye(3), cross(axes)
     squares, accelerations = np.moveaxis(turning_rad2_s2, 1, 0)[..., None, None]
@@ -238,7 +241,7 @@ def _differentiate_delay(theta: Array, movement: Movement) -> Array:
 
 
 def jacobian(theta: Array, movement: Movement) -> Array:
-    """Return the derivative (3 K, 22) of the readings with respect to θ."""
+    """Return the derivative (3 K, 22) of the readings with respect to the parameters `theta`."""
     s, gravity = find_force(theta, movement), project_reference(theta[DELAY], movement)
     square = _product(s, s, movement)
     columns = np.zeros((*s.shape, PARAMETERS))

@@ -36,7 +36,7 @@ CONVERGED_CHANGE_RATIO = 1e-3  # of δ
 
 @dataclass(frozen=True, slots=True)
 class AttitudeError:
-    """The std δ of attitudes about each axis, rad, beyond their stated uncertainty; `uncertainty_rad` is δ's own std.
+    """The std of attitudes about each axis, rad, beyond their stated uncertainty; `uncertainty_rad` is its own std.
 
     Near zero the likelihood is one-sided, and `uncertainty_rad` is the std towards larger values.
     """
@@ -75,7 +75,7 @@ class AttitudeReadings:
 
 @dataclass(frozen=True, slots=True)
 class AttitudeWeighted:
-    """The parameters θ (p,), their covariance (p, p), the attitude error, and the readings' `whiteners` (N, 3, 3)."""
+    """The parameters `theta` (p,), their covariance (p, p), the attitude error, and the readings' whiteners."""
 
     theta: Array
     covariance: Array
@@ -85,7 +85,7 @@ class AttitudeWeighted:
 
 
 def solve_attitude_weighted(start: Array, placed: AttitudeReadings) -> AttitudeWeighted:
-    """Return the most likely θ and attitude error δ, from `start` (p,), by alternating steps until δ converges."""
+    """Return the most likely parameters and attitude error, by alternating steps from `start` until they converge."""
     r, v_bar, norm_known = placed.attitudes, placed.v_bar, placed.norm_known
     theta, steps, delta, last = start, 0, 0.0, np.inf
     for _ in range(MAX_ITERATIONS):
@@ -143,7 +143,7 @@ def find_whiteners(variances: Array, rotations: Array, std_rad: Array) -> Array:
 
 
 def _estimate_std(theta: Array, placed: AttitudeReadings) -> float:
-    """Return the restricted-maximum-likelihood estimate of δ."""
+    """Return the restricted-maximum-likelihood estimate of the attitude error, rad."""
     r, v_bar = placed.attitudes, placed.v_bar
     rotations = effects(theta, r, v_bar)
     whiteners = find_whiteners(placed.variances, rotations, placed.attitude_std_rad)
@@ -158,7 +158,7 @@ def _estimate_std(theta: Array, placed: AttitudeReadings) -> float:
 def maximise_likelihood(
     growth: Array, residuals: Array, slopes: Array, nuisance: Array | None = None
 ) -> tuple[float, float]:
-    """Return the restricted-maximum-likelihood estimate of δ, rad, and the negative log-likelihood up to a constant.
+    """Return the most likely attitude error δ, rad, and the negative restricted log-likelihood up to a constant.
 
     Residuals (n,) are independent with variances 1 + δ² γ, `growth` (n,) being γ; `slopes` (n, q) are the model's
     columns, `nuisance` (n, k) further explanatory columns. The constant depends on the slopes alone. The search takes
@@ -200,7 +200,10 @@ def maximise_likelihood(
 
 
 def _find_uncertainty(delta: float, fit: Array, rotations: Array) -> float:
-    """Return δ's std from the expected information on δ²: tr((P G)²)/2 with G = E Eᵀ, P being the residual maker."""
+    """Return the std of the attitude error `delta` δ, from the expected information on δ².
+
+    The information is tr((P G)²)/2 with G = E Eᵀ, the effects E (`rotations`), and the residual maker P of the `fit`.
+    """
     orthogonal = np.linalg.qr(fit)[0].reshape(*rotations.shape[:2], -1)
     growth = rotations @ np.swapaxes(rotations, -1, -2)
     grown = growth @ orthogonal

@@ -172,7 +172,7 @@ def _check_attitudes(start: Array, movement: Movement, fixed: list[int], fit: Fi
 
 
 def _find_worst_dwell(start: Array, movement: Movement, fixed: list[int], fit: Fit) -> tuple[int, float, float]:
-    """Return the index of the dwell that fits worst, its error, rad, relative to the others, and the others' δ, rad."""
+    """Return the index of the dwell that fits worst, its error relative to the others, and the others' error, rad."""
     count = len(movement.dwells.readings_m_s2)
     residuals = (movement.readings() - predicted(fit.theta, movement))[:count]
     rotations = effects(fit.theta, movement)[: 3 * count].reshape(count, 3, -1)

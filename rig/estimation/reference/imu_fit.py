@@ -31,7 +31,7 @@ DISTURBANCE_ODDS = 1 / 19  # prior: one dwell or sweep is disturbed, or all swee
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """A fit: parameters θ (22,), attitude error δ `std_rad`, and Jacobian (3 K, q) in the `free` directions (22, q)."""
+    """A fit: parameters `theta` (22,), attitude error `std_rad`, and Jacobian (3 K, q) in `free` directions (22, q)."""
 
     theta: Array
     readings: Decorrelation
@@ -41,11 +41,11 @@ class Fit:
     iterations: int
 
     def covariance(self) -> Array:
-        """Return the covariance (22, 22) of θ from the Fisher information."""
+        """Return the covariance (22, 22) of the parameters from the Fisher information."""
         return np.asarray(self.free @ self._inverse() @ self.free.T, dtype=np.float64)
 
     def response(self) -> Array:
-        """Return the derivative (22, 3 K) of θ with respect to the readings."""
+        """Return the derivative (22, 3 K) of the parameters with respect to the readings."""
         whitener = self.readings.whitener(self.std_rad)
         return np.asarray(self.free @ self._inverse() @ (whitener @ self.jacobian).T @ whitener, dtype=np.float64)
 
@@ -60,9 +60,10 @@ class Fit:
 def covariance_bound(
     theta: Array, movement: Movement, attitude_std_rad: float, *, second_order: bool = False
 ) -> tuple[Array, Array]:
-    """Return the Cramér–Rao bound (22, 22) at the true θ (22,) and attitude error δ, and ∂θ/∂readings (22, 3 K).
+    """Return the Cramér–Rao bound (22, 22) of the parameters, and their derivative (22, 3 K) by the readings.
 
-    The bound and the derivative depend on movement and noise, not on the readings.
+    `theta` (22,) and `attitude_std_rad` are the true values. Both results depend on movement and noise, not on the
+    readings.
     """
     free = find_free_directions(theta, list_fixed(movement, second_order=second_order))
     readings = decorrelate(noise(theta, movement), effects(theta, movement))
@@ -71,16 +72,16 @@ def covariance_bound(
 
 
 def slopes(theta: Array, movement: Movement, *, second_order: bool) -> Array:
-    """Return the derivative (3 K, q) of the readings in the free directions of θ (22,)."""
+    """Return the derivative (3 K, q) of the readings in the free directions of the parameters `theta` (22,)."""
     return np.asarray(
         jacobian(theta, movement) @ find_free_directions(theta, list_fixed(movement, second_order=second_order))
     )
 
 
 def most_likely(start: Array, movement: Movement, fixed: list[int], attitude_std_rad: float | None) -> Fit:
-    """Return the most likely θ and attitude error δ, from `start` (22,), by alternating steps until δ converges.
+    """Return the most likely parameters and attitude error, by alternating steps from `start` (22,) until convergence.
 
-    `fixed`: indices of elements of θ that keep their value.
+    `fixed`: indices of parameters that keep their value. `attitude_std_rad`: the attitude error if it is given.
     """
     theta, steps = start, 0
     delta, last = attitude_std_rad or 0.0, np.inf
@@ -99,7 +100,7 @@ def most_likely(start: Array, movement: Movement, fixed: list[int], attitude_std
 
 
 def _least_squares(theta: Array, movement: Movement, fixed: list[int], whitener: Array) -> tuple[Array, int]:
-    """Return the least-squares θ by Gauss–Newton steps, and the number of steps."""
+    """Return the least-squares parameters by Gauss–Newton steps from `theta`, and the number of steps."""
     readings, norm = movement.readings(), np.linalg.norm(theta[REFERENCE])
     rounding = 1e-13 * float(np.linalg.norm(whitener @ readings.ravel()))
     steps, moved = 0, np.inf
@@ -139,13 +140,13 @@ def refit_with_components(
 
 
 def list_fixed(movement: Movement, *, second_order: bool) -> list[int]:
-    """Return the indices of the elements of θ that are not estimated."""
+    """Return the indices, among the 22 parameters, of those that are not estimated."""
     fixed = [] if second_order else list(range(PARAMETERS))[SECOND]
     return fixed if len(movement.sweeps.speeds_rad_s) else [*range(LEVER.start, LEVER.stop), DELAY, *fixed]
 
 
 def find_free_directions(theta: Array, fixed: list[int]) -> Array:
-    """Return the free directions (22, q) of θ, in which v_ref keeps its norm and the elements `fixed` their values."""
+    """Return the free directions (22, q) of `theta`, which change neither v_ref's norm nor the `fixed` elements."""
     directions = free_directions(theta, norm_known=True)
     free: Array = np.delete(directions, [index - 1 for index in fixed], axis=1)  # v_ref has one column fewer
     return free

@@ -27,7 +27,7 @@ REMEDY = "Take attitudes turned about at least two axes, or sweep about more axe
 
 
 def linear_start(movement: Movement, norm: float, up: Array) -> Array:
-    """Return the initial θ (22,); the reference v_ref in it has the length `norm` and a positive product with `up`.
+    """Return the initial parameters (22,); the reference in them has this `norm` and a positive product with `up`.
 
     Raise Fault `rank_deficient`, `ill_conditioned`, `sign_unknown`.
     """
@@ -36,7 +36,7 @@ def linear_start(movement: Movement, norm: float, up: Array) -> Array:
 
 
 def _linear(movement: Movement, readings: Array, norm: float, up: Array) -> Array:
-    """Return θ by the linear equations, for readings (K, 3) minus the effect of the flange's own acceleration."""
+    """Return the parameters by linear equations, for readings (K, 3) minus the effect of the flange's acceleration."""
     x = np.zeros((*readings.shape, LEVER.stop))
     for axis in range(3):
         x[:, axis, 3 * axis : 3 * axis + 3] = readings

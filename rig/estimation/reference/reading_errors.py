@@ -37,9 +37,10 @@ def noise(theta: Array, movement: Movement) -> Array:
 
 
 def nonlinearity_patterns(theta: Array, movement: Movement) -> Array:
-    """Return the effects (P, 3 K) on the readings of one standard uncertainty of each axis' nonlinearities φ and χ.
+    """Return the effects (P, 3 K) on the readings of one standard uncertainty of each axis' nonlinearity.
 
-    φ is the quadratic and χ the cubic one, as in `accelerometer_errors`; those of zero uncertainty are left out.
+    The quadratic and the cubic nonlinearity of `accelerometer_errors` come separately; one without uncertainty is left
+    out.
     """
     sensor = movement.sensor_errors
     if sensor is None:
@@ -52,7 +53,7 @@ def nonlinearity_patterns(theta: Array, movement: Movement) -> Array:
 
 
 def bias_warming(movement: Movement) -> Array:
-    """Return the patterns (6, 3 K) of one standard uncertainty of β, the temperature coefficient of each axis's bias.
+    """Return the patterns (6, 3 K) of one standard uncertainty of the temperature coefficient of each axis's bias.
 
     Three are for the recorded temperature, three for changes smaller than a step of the thermometer.
     """
@@ -65,7 +66,7 @@ def bias_warming(movement: Movement) -> Array:
 
 
 def scale_warming(theta: Array, movement: Movement) -> Array:
-    """Return the patterns (6, 3 K) of one standard uncertainty of κ, the temperature coefficient of each axis's scale.
+    """Return the patterns (6, 3 K) of one standard uncertainty of the temperature coefficient of each axis's scale.
 
     Three are for the recorded temperature, three for changes smaller than a step of the thermometer.
     """

@@ -72,9 +72,9 @@ class NormUncertainty:
 
 
 def scale_and_bias(matrix: Array, scale: Array, parameters: int) -> Array:
-    """Return the derivative (6, p) of scale and bias with respect to θ (p,), which begins with F, the reference and b.
+    """Return the derivative (6, p) of scale and bias with respect to parameters that begin with F, reference and b.
 
-    The bias changes its sign, because in θ it is a part of the reading, but in a result it is added to the reading.
+    The bias changes its sign, because b is a part of the reading, but in a result the bias is added to the reading.
     """
     derivative = np.zeros((6, parameters))
     derivative[:, np.r_[F, BIAS]] = parameter_jacobian(matrix, scale) * np.repeat([1.0, -1.0], 3)[:, None]
@@ -82,7 +82,7 @@ def scale_and_bias(matrix: Array, scale: Array, parameters: int) -> Array:
 
 
 def scale_and_bias_covariance(matrix: Array, scale: Array, covariance: Array) -> Array:
-    """Propagate the covariance of θ to scale and bias (6, 6), with the signs of `scale_and_bias`."""
+    """Return the covariance (6, 6) of scale and bias from the parameters' one, with the signs of `scale_and_bias`."""
     to_parameters = scale_and_bias(matrix, scale, len(covariance))
     propagated: Array = to_parameters @ covariance @ to_parameters.T
     return propagated

@@ -26,24 +26,24 @@ STEP_TOLERANCE = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class KnownVector:
-    """The given v̄ (N, 3), in body coordinates, due to the table's motion: for a gyroscope, the table's own rate."""
+    """The part `added` (N, 3) of the input, in body coordinates, that the table's motion adds, such as its own rate."""
 
     added: ArrayLike
 
     def v_bar(self, count: int) -> Array:
-        """Return v̄ (N, 3) for `count` attitudes."""
+        """Return the input (N, 3) that the table's motion adds in `count` attitudes."""
         return np.asarray(self.added, dtype=np.float64)
 
 
 @dataclass(frozen=True, slots=True)
 class KnownNorm:
-    """The given norm of v_ref, with v̄ = 0; `side` (3,), table coordinates, has a positive dot product with v_ref."""
+    """The given norm of the reference of a table at rest, which has a positive dot product with `side` (3,)."""
 
     norm: float
     side: ArrayLike
 
     def v_bar(self, count: int) -> Array:
-        """Return v̄ (N, 3) for `count` attitudes: zero."""
+        """Return the input (N, 3) that the table's motion adds in `count` attitudes: zero."""
         return np.zeros((count, 3))
 
 
@@ -51,13 +51,13 @@ ReferencePrior = KnownVector | KnownNorm
 
 
 def sensed(theta: Array, attitudes: Array, v_bar: Array) -> Array:
-    """Return s = Rᵀ v_ref + v̄ (…, N, 3) from attitudes (N, 3, 3) and v̄ (N, 3)."""
+    """Return the sensor's input s = Rᵀ v_ref + `v_bar` (…, N, 3) in attitudes R (N, 3, 3); `theta` contains v_ref."""
     s: Array = np.einsum("nji,...j->...ni", attitudes, theta[..., REFERENCE]) + v_bar
     return s
 
 
 def predicted(theta: Array, attitudes: Array, v_bar: Array) -> Array:
-    """Return the readings v_m (…, N, 3) that the model predicts for θ."""
+    """Return the readings (…, N, 3) that the model predicts for the parameters `theta`."""
     s = sensed(theta, attitudes, v_bar)
     if theta.shape[-1] > 15:
         s = s + theta[..., None, SECOND] * s**2
@@ -66,12 +66,12 @@ def predicted(theta: Array, attitudes: Array, v_bar: Array) -> Array:
 
 
 def matrix(theta: Array) -> Array:
-    """Return the matrix F (…, 3, 3) in θ."""
+    """Return the matrix F (…, 3, 3) in the parameters `theta`."""
     return theta[..., F].reshape(*theta.shape[:-1], 3, 3)
 
 
 def jacobian(theta: Array, attitudes: Array, v_bar: Array) -> Array:
-    """Return the derivative (…, N, 3, 15 or 18) of the readings with respect to θ."""
+    """Return the derivative (…, N, 3, 15 or 18) of the readings with respect to the parameters `theta`."""
     s, f = sensed(theta, attitudes, v_bar), matrix(theta)[..., None, :, :]
     slope, nonlinear = np.ones_like(s), s
     if theta.shape[-1] > 15:
@@ -88,7 +88,7 @@ def jacobian(theta: Array, attitudes: Array, v_bar: Array) -> Array:
 
 
 def free_directions(theta: Array, *, norm_known: bool) -> Array:
-    """Return the free directions (…, p, q) of θ: q = p, or p − 1 if v_ref keeps its given norm."""
+    """Return the free directions (…, p, q) of `theta`: q = p, or p − 1 if the reference keeps its given norm."""
     p = theta.shape[-1]
     free = np.zeros((*theta.shape[:-1], p, p))
     free[...] = np.eye(p)
@@ -116,19 +116,19 @@ def whitened(whiteners: Array, residuals: Array) -> Array:
 
 
 def weighted_jacobian(theta: Array, attitudes: Array, v_bar: Array, whiteners: Array, *, norm_known: bool) -> Array:
-    """Return W J (…, 3 N, q), the whitened Jacobian in θ's free directions; (W J)ᵀ W J is the Fisher information."""
+    """Return the whitened Jacobian (…, 3 N, q) of the readings in the free directions of the parameters `theta`."""
     return _reduce_jacobian(theta, attitudes, v_bar, whiteners, free_directions(theta, norm_known=norm_known))
 
 
 def _reduce_jacobian(theta: Array, attitudes: Array, v_bar: Array, whiteners: Array, free: Array) -> Array:
-    """Return W J (…, 3 N, q) in the directions `free` (…, p, q)."""
+    """Return the whitened Jacobian (…, 3 N, q) of the readings in the directions `free` (…, p, q)."""
     rows = whiteners @ jacobian(theta, attitudes, v_bar)
     reduced: Array = rows.reshape(*rows.shape[:-3], -1, rows.shape[-1]) @ free
     return reduced
 
 
 def covariance_bound(theta: Array, attitudes: Array, v_bar: Array, whiteners: Array, *, norm_known: bool) -> Array:
-    """Return the inverse (…, p, p) of the Fisher information: the Cramér–Rao bound of θ."""
+    """Return the Cramér–Rao bound (…, p, p) of the parameters: the inverse of the Fisher information."""
     free = free_directions(theta, norm_known=norm_known)
     reduced = _reduce_jacobian(theta, attitudes, v_bar, whiteners, free)
     size = np.linalg.norm(reduced, axis=-2, keepdims=True)
@@ -141,7 +141,7 @@ def covariance_bound(theta: Array, attitudes: Array, v_bar: Array, whiteners: Ar
 def most_likely(
     start: Array, readings: Array, attitudes: Array, v_bar: Array, whiteners: Array, *, norm_known: bool
 ) -> tuple[Array, int]:
-    """Return θ (…, p) of weighted least squares by Gauss–Newton from `start`, and the number of steps."""
+    """Return the parameters (…, p) of weighted least squares, by Gauss–Newton from `start`, and the number of steps."""
     theta = start.copy()
     norm = np.linalg.norm(theta[..., REFERENCE], axis=-1, keepdims=True)
     steps = 0

@@ -17,7 +17,10 @@ from rig.estimation.reference.attitude_error import AttitudeError, maximise_like
 
 @dataclass(frozen=True, slots=True)
 class Decorrelation:
-    """The map `transform` (n, n) from readings to independent readings of variances 1 + δ² γ; `growth` (n,) is γ."""
+    """The map `transform` (n, n) from readings to independent ones with the variances 1 + `growth` × δ².
+
+    δ is the unknown standard deviation of the shared errors.
+    """
 
     transform: Array
     growth: Array
@@ -39,12 +42,12 @@ def decorrelate(noise: Array, effects: Array) -> Decorrelation:
 
 
 def estimate_common_error(readings: Decorrelation, residuals: Array, jacobian: Array) -> float:
-    """Return δ in rad, by restricted maximum likelihood, from residuals (n,) and J (n, q)."""
+    """Return the std of the shared errors by restricted maximum likelihood, from residuals (n,) and a Jacobian."""
     return maximise_likelihood(readings.growth, readings.transform @ residuals, readings.transform @ jacobian)[0]
 
 
 def add_uncertainty(readings: Decorrelation, std_rad: float, jacobian: Array) -> AttitudeError:
-    """Return δ with its uncertainty, from the expected information on δ²."""
+    """Return the std `std_rad` of the shared errors with its uncertainty, from the expected information."""
     expected = information(readings.growth, std_rad, readings.transform @ jacobian)
     if expected <= 0:
         return AttitudeError(std_rad, float("inf"))
@@ -52,7 +55,10 @@ def add_uncertainty(readings: Decorrelation, std_rad: float, jacobian: Array) ->
 
 
 def information(growth: Array, std_rad: float, slopes: Array) -> float:
-    """Return the information on δ²: tr((P G)²)/2 with G = E Eᵀ, P being the residual maker of the slopes (n, q)."""
+    """Return the expected information on the shared errors' variance: tr((P G)²)/2.
+
+    G is the part of the readings' covariance per unit of that variance, and P the residual maker of `slopes` (n, q).
+    """
     variance = 1 + std_rad**2 * growth
     growth = growth / variance
     orthogonal = np.linalg.qr(slopes / np.sqrt(variance)[:, None])[0]

@@ -49,14 +49,14 @@ def column_sizes(readings: Array, squares: Array | None) -> Array:
 
 
 def least_squares(x: Array, sizes: Array, v_bar: Array) -> Array:
-    """Return β (…, p) of Eq. (6) for X (…, 3 N, p), column `sizes` (…, p) and v̄ (N, 3)."""
+    """Return β (…, p) of Eq. (6) for the design `x` (…, 3 N, p) with column `sizes` (…, p), and the motion `v_bar`."""
     scaled = x / sizes[..., None, :]
     beta: Array = (np.linalg.pinv(scaled) @ v_bar.reshape(-1)) / sizes
     return beta
 
 
 def null_vector(x: Array, sizes: Array, norm: float, side: Array) -> Array:
-    """Return β (…, p) of Eq. (5) for X (…, 3 N, p), with ‖v_ref‖ = `norm`, in the half-space of `side` (3,)."""
+    """Return β (…, p) of Eq. (5) for the design `x` (…, 3 N, p) and a reference of this `norm` towards `side`."""
     _, _, directions = np.linalg.svd(x / sizes[..., None, :], full_matrices=False)
     beta = directions[..., -1, :] / sizes
     reference = beta[..., REFERENCE]
@@ -66,7 +66,7 @@ def null_vector(x: Array, sizes: Array, norm: float, side: Array) -> Array:
 
 
 def to_theta(beta: Array) -> Array:
-    """Return θ of the forward model, which has F and b, from β, which has F⁻¹ and b* = F⁻¹ b."""
+    """Return the parameters of the forward model, with F and b, from `beta`, which contains F⁻¹ and F⁻¹ b instead."""
     theta = beta.copy()
     f = np.linalg.inv(matrix(beta))
     theta[..., F] = f.reshape(*f.shape[:-2], 9)
@@ -77,7 +77,7 @@ def to_theta(beta: Array) -> Array:
 def estimate_as_published(
     readings: Array, attitudes: Array, prior: ReferencePrior, *, second_order: bool
 ) -> tuple[Array, int]:
-    """Return the parameters θ (…, 15 or 18) by the paper's method as published, and the number of linear solutions.
+    """Return the parameters (…, 15 or 18) by the paper's method as published, and the number of linear solutions.
 
     With second-order terms the linear solution is repeated until it converges, with s² computed from the last v_ref.
     """
@@ -111,7 +111,7 @@ def _solve(x: Array, sizes: Array, prior: ReferencePrior) -> Array:
 def compute_published_covariance(
     theta: Array, readings: Array, attitudes: Array, prior: ReferencePrior, variances: Array
 ) -> Array:
-    """Return the covariance (p, p) of θ by the published method, to first order in the readings' errors.
+    """Return the covariance (p, p) of the parameters by the published method, to first order in the readings' errors.
 
     The errors have `variances` (N, 3). An error e of a reading also changes the matrix X of the equations, so the error
     enters equation k as F⁻¹ e_k. Hence δβ = −X⁺ F⁻¹ e, of which the part that would change ‖v_ref‖ is removed if that

@@ -180,7 +180,7 @@ def _require_revolution(angle_rad: Array) -> None:
 
 
 def _fourier_columns(angle_rad: Array, count: int) -> Array:
-    """Return 1, cos θ, sin θ, cos 2θ, … (n, 1 + 2 count)."""
+    """Return the columns 1, cos θ, sin θ, cos 2θ, … (n, 1 + 2 `count`) at the angles θ (n,)."""
     multiples = angle_rad[:, None] * np.arange(1, count + 1)
     waves = np.stack([np.cos(multiples), np.sin(multiples)], axis=-1).reshape(len(angle_rad), -1)
     return np.column_stack([np.ones_like(angle_rad), waves])
@@ -240,11 +240,12 @@ def _motion_terms(uneven: _Unevenness, turn: JointTurn) -> Array:
 
 
 def _list_vibration(uneven: _Unevenness, angle_rad: Array, mean_speed_rad_s: float) -> Array:
-    """Return the specific force (n, 6) of the joint's vibration, with derivatives of α for the filter's lag.
+    """Return the specific force (n, 6) of the joint's vibration, with derivatives for the filter's lag.
 
-    The centripetal acceleration is represented by its linear part, 2 ω₀ (ω − ω₀), without (ω − ω₀)². This square has a
-    mean, which the columns of a vibration at one frequency could imitate, so that the regression would remove it from
-    the mean of the readings. The model accounts for the square instead, by `FirstHarmonic.turning_rad2_s2`.
+    At the rate ω, with the mean ω₀, the centripetal acceleration has the linear part 2 ω₀ (ω − ω₀). It represents the
+    whole, without the square (ω − ω₀)². This square has a mean, which the columns of a vibration at one frequency could
+    imitate, so that the regression would remove it from the mean of the readings. The model accounts for the square
+    instead, by `FirstHarmonic.turning_rad2_s2`.
     """
     rate, *derivatives = uneven.fast
     return np.column_stack([rate, *derivatives, rate * np.cos(angle_rad), rate * np.sin(angle_rad)])

@@ -111,7 +111,7 @@ def solve_triaxial(
     method: Method = "as_published",
     attitude_std_rad: ArrayLike | None = None,
 ) -> TriaxialSolution:
-    """Return F, v_ref and b, and with `second_order` also φ.
+    """Return a triad's matrix F, reference v_ref and bias b, and with `second_order` also the quadratic terms φ.
 
     - `readings`, `variances` (N, 3): mean readings and the variances of these means.
     - `attitudes` (N, 3, 3): R, body to table.
@@ -181,9 +181,10 @@ def solve_triaxial_batch(
     second_order: bool = False,
     method: EqualWeights = "as_published",
 ) -> Array:
-    """Return θ (R, 15 or 18) = [rows of F, v_ref, b, φ] of many runs (R, N, 3) in the same attitudes, unchecked.
+    """Return the parameters (R, 15 or 18) of many runs (R, N, 3) in the same attitudes, without checks.
 
-    `attitudes` (N, 3, 3), `variances` (N, 3) and `prior` are the same for every run, as in `solve_triaxial`.
+    The parameters are F row by row, the reference, the bias, and the quadratic terms if `second_order`. `attitudes`
+    (N, 3, 3), `variances` (N, 3) and `prior` are the same for every run, as in `solve_triaxial`.
     """
     m, r, v = (np.asarray(a, dtype=np.float64) for a in (readings, attitudes, variances))
     theta, _ = estimate_as_published(m, r, prior, second_order=second_order)

@@ -117,7 +117,10 @@ def too_short(what: str, enough_s: float = MIN_DURATION_S) -> Fault:
 
 
 def equivalent_dof(points: int, factor: int, noise: Noise) -> float:
-    """Return the equivalent dof (at least 1) of σ² from `points` phases (readings + 1) at τ = `factor` τ₀."""
+    """Return the equivalent dof (at least 1) of an Allan variance over `factor` readings each.
+
+    `points` is the number of phases, one more than that of all readings.
+    """
     # Approximations for white, flicker and random-walk noise of frequency: NIST SP 1065, table 5.
     n, m = float(points), float(factor)
     if noise == "white":
@@ -130,7 +133,7 @@ def equivalent_dof(points: int, factor: int, noise: Noise) -> float:
 
 
 def _average_squares(phases: Sequence[Array], factor: int) -> Array:
-    """Return σ² (3,) at τ = `factor` τ₀ over all intervals long enough."""
+    """Return the Allan variance (3,) over `factor` readings, from all intervals that are long enough."""
     total, count = np.zeros(3), 0
     for phase in phases:
         if len(phase) > 2 * factor:
@@ -150,7 +153,7 @@ def _dof(points: Sequence[int], factor: int, noise: Noise) -> float:
 
 
 def _slopes(tau_s: Array, deviation: Array) -> Array:
-    """Return the slopes (T, 3) of log σ over log τ between the neighbours of each τ; −1/2 if the curve has one τ."""
+    """Return the slopes (T, 3) of the log–log curve between the neighbours of each point; −1/2 for a single point."""
     if len(tau_s) < 2:
         return np.full(deviation.shape, -0.5)
     logarithm = np.log(np.maximum(deviation, np.finfo(np.float64).tiny))
@@ -208,7 +211,7 @@ def _random_walk(curve: AllanCurve, axis: int) -> AllanReading | Fault:
 
 
 def _instability(curve: AllanCurve, axis: int, walk: AllanReading | Fault) -> AllanReading | Fault:
-    """Return the bias instability B from the minimum of σ, if that lies in the well-determined part of the curve."""
+    """Return the bias instability from the curve's minimum, if that lies in the well-determined part of the curve."""
     relative_std = curve.relative_std[:, axis]
     usable = np.flatnonzero(relative_std <= MAX_INSTABILITY_STD)
     if not len(usable):

@@ -143,19 +143,19 @@ def average_posterior(sizes: Array, likelihood: Array) -> Array:
 
 
 def average_walks(sizes: Array, likelihood: Array) -> Array:
-    """Return the root-mean-square (2,) of q and s over the posterior of `sizes` (K, 2), with a uniform prior of q.
+    """Return the root-mean-square (2,) of random walk and scatter over their posterior, if the walk's prior is uniform.
 
     The scatter has the prior of `average_posterior`. These averages are for parameters over a long time, such as slopes
-    over temperature: their uncertainty may come mostly from a walk that the readings hardly show. So a walk is assumed
-    to exist, with a uniform prior (Gelman, Bayesian Analysis 1 (2006) 515). Sizes are on a geometric grid, so a size's
-    prior is proportional to the step to the next, that is, to the size itself.
+    over temperature, whose uncertainty may come mostly from a walk that the readings hardly show. So a walk is assumed
+    to exist, with a uniform prior (Gelman, Bayesian Analysis 1 (2006) 515). The `sizes` (K, 2) are on a geometric grid,
+    so a size's prior is proportional to the step to the next size, that is, to the size itself.
     """
     log_posterior = likelihood - np.log(GRID_POINTS) * np.count_nonzero(sizes[:, 1:], axis=1)
     return _root_mean_square(sizes, log_posterior, prior=sizes[:, 0])
 
 
 def _root_mean_square(sizes: Array, log_posterior: Array, prior: Array | float = 1.0) -> Array:
-    """Return the root-mean-square (2,) of q and s (K, 2), with weights exp(`log_posterior`) times `prior` (K,)."""
+    """Return the root-mean-square (2,) of the `sizes` (K, 2), with weights exp(`log_posterior`) times `prior` (K,)."""
     weights = prior * np.exp(log_posterior - log_posterior.max())
     return np.asarray(np.sqrt(weights @ sizes**2 / weights.sum()), dtype=np.float64)
 

@@ -44,8 +44,8 @@ class ResidualInputs:
 class ErrorSizes:
     """The estimated standard deviations of the shared errors.
 
-    `walk`: the bias random walk in one second; `std_rad`: the attitude error δ; `independent_fraction`: the fraction of
-    δ² that is independent in each dwell.
+    `walk`: the bias random walk in one second; `std_rad`: the attitude error; `independent_fraction`: the fraction of
+    the attitude error's variance that is independent in each dwell.
     """
 
     walk: float
@@ -54,10 +54,11 @@ class ErrorSizes:
 
 
 def estimate_variances(fit: ResidualInputs, fractions: Sequence[float]) -> ErrorSizes:
-    """Return the root-mean-squares of random walk and attitude error δ over their posterior, and the mean fraction.
+    """Return the root-mean-squares of random walk and attitude error over their posterior, and the mean fraction.
 
-    The prior of the random walk is spike-and-slab, with a log-uniform slab; that of δ is log-uniform. The `fractions`
-    are possible fractions of δ² that are independent in each dwell; all are equally probable.
+    The prior of the random walk is spike-and-slab, with a log-uniform slab; that of the attitude error is log-uniform.
+    The `fractions` are possible fractions of the attitude error's variance that are independent in each dwell; all are
+    equally probable.
     """
     constant = np.diag(fit.walk) > 0
     typical = np.sqrt(np.median(fit.noise[constant]) / np.median(np.diag(fit.walk)[constant]))
@@ -108,7 +109,7 @@ def estimate_disturbances(
 
 
 def _find_likelihoods(residuals: Array, whitener: Array, effects: Array, sizes: Array) -> Array:
-    """Return log-likelihoods (k,) of residuals (n,), up to a constant, for the values `sizes` (k,) of δ.
+    """Return log-likelihoods (k,) of residuals (n,), up to a constant, for attitude errors of the `sizes` (k,).
 
     `whitener` (n, n), triangular, whitens all modelled errors except the arm's `effects` (n, P).
     """

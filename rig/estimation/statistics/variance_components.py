@@ -59,7 +59,7 @@ class Mixed:
 
 @dataclass(frozen=True, slots=True)
 class MixedFit:
-    """The fitted θ (p,), its `covariance` (p, p), the log-likelihood, and `residuals` (m,)."""
+    """The fitted coefficients `theta` (p,), their covariance (p, p), the log-likelihood, and the residuals (m,)."""
 
     theta: Array
     covariance: Array
@@ -69,7 +69,7 @@ class MixedFit:
 
 @dataclass(frozen=True, slots=True)
 class _Ascent:
-    """A search for a maximum of the posterior, over ln σ (k,).
+    """A search for a maximum of the posterior of the logarithms (k,) of standard deviations.
 
     - point (k,): the end of the search; value: the negative log-posterior there.
     - ridge: the visited points that are lower than the last one by at most `RIDGE_DROP`.
@@ -100,14 +100,14 @@ class MixedModel:
         return total
 
     def solve(self, std: Array) -> MixedFit:
-        """Return θ for given standard deviations (k,). Raise LinAlgError if the equations are singular."""
+        """Return the fit for given standard deviations (k,). Raise LinAlgError if the equations are singular."""
         _, design, observed, information, likelihood = self._whiten(std)
         covariance = np.asarray(np.linalg.inv(information), dtype=np.float64)
         theta = covariance @ (design.T @ observed)
         return MixedFit(theta, covariance, likelihood, self.mixed.observed - self.mixed.design @ theta)
 
     def evaluate_posterior(self, std: Array) -> float:
-        """Return the log-posterior density of ln σ (k,).
+        """Return the log-posterior density of the logarithms of standard deviations `std` (k,).
 
         The density lacks an additive constant. It does not change if columns with prior precision 1 are added to the
         design, so models of the same observations that differ only in such columns can be compared.
@@ -115,7 +115,10 @@ class MixedModel:
         return self._whiten(std)[-1] + self._log_prior(np.log(std))
 
     def restrict(self, std: Array) -> tuple[Array, Array]:
-        """Return P (m, m) of the restricted likelihood, which is C⁻¹ without the part that θ explains, and P y (m,)."""
+        """Return P (m, m) of the restricted likelihood, and P y (m,) for the observations y.
+
+        P is the inverse of the errors' covariance without the part that the design explains.
+        """
         lower, _, _, information, _ = self._whiten(std)
         return self._project(lower, information)
 
@@ -179,7 +182,7 @@ class MixedModel:
         return _Ascent(reached.x, float(reached.fun), ridge, joins(reached.x))
 
     def causes(self, std: Array, fit: MixedFit) -> list[Array]:
-        """Return the parts (p, p) of θ's covariance that are due to C₀, each variance component, and the prior of θ."""
+        """Return the parts (p, p) of a fit's covariance due to the fixed errors, each component, and the prior."""
         from scipy.linalg import cho_factor, cho_solve
 
         factor = cho_factor(self.covariance(std), lower=True)
@@ -188,7 +191,7 @@ class MixedModel:
         return [*(weights.T @ part @ weights for part in parts), fit.covariance * self.mixed.precision @ fit.covariance]
 
     def expand(self, maxima: Array, wanted: Array) -> Array:
-        """Return the half-widths (q,) of the 95.45 % intervals of q combinations of θ, the rows of `wanted` (q, p).
+        """Return the half-widths (q,) of the 95.45 % intervals of combinations `wanted` (q, p) of the coefficients.
 
         The intervals are about the estimates at the first of `maxima` (n, k), and integrate over all standard
         deviations.
@@ -243,14 +246,14 @@ class MixedModel:
         return projected, projected @ self.mixed.observed
 
     def _log_prior(self, logarithms: Array) -> float:
-        """Return the log-density of ln σ, up to a constant: half-Cauchy priors, and the χ² likelihood of `alone`."""
+        """Return the log-density of `logarithms`, up to a constant: half-Cauchy priors, and likelihood of `alone`."""
         relative = logarithms - np.log(self.mixed.scales)
         squares, dof = self.mixed.alone.T
         measured = dof * logarithms + squares / 2 * np.exp(-2 * logarithms)
         return float(np.sum(relative - np.logaddexp(0, 2 * relative) - measured))
 
     def _evaluate(self, logarithms: Array) -> tuple[float, Array, Array]:
-        """Return the negative log-posterior of ln σ (k,), its gradient and its average information (k, k)."""
+        """Return the negative log-posterior of `logarithms` (k,), its gradient and its average information (k, k)."""
         if self._last is not None and np.array_equal(self._last[0], logarithms):
             return self._last[1]
         try:

@@ -177,10 +177,10 @@ class ArmMotion:
         return self._mean_rates(time_s, _averaging_time(time_s), standing_rad)
 
     def state_gain(self, time_s: Array, weights: Array) -> float:
-        """Return how many times more noise the states' angles cause in a mean of `rates_at_samples` than in Δθ/T.
+        """Return how many times more noise the states' angles cause in a weighted mean rate than in the plain mean.
 
-        `weights` (n,) are those of the mean; Δθ/T is the angle from first to last state, divided by the time. For this
-        ratio, angles between states are interpolated linearly.
+        The weighted mean is that of `rates_at_samples` with `weights` (n,); the plain mean is the angle from first to
+        last state divided by the time. For this ratio, angles between states are interpolated linearly.
         """
         lasting_s = _averaging_time(time_s)
         # A rate at a sample is the difference of two interpolated angles; `by_state` is the weight of each state.
