@@ -128,12 +128,12 @@ def _split(whole: Array, parts: dict[str, Array], budget: Budget) -> Array:
 
 
 def _angle_derivatives(matrix: Array) -> Array:
-    """Return the derivative (6, 3, 3) of the angles between the axes, and of their mounting, with respect to F."""
+    """Return the derivative (6, 3, 3) of the angles between the axes, then of their mounting, by the `matrix`."""
     return SensorAxes.from_matrix(matrix).to_angles.reshape(6, 3, 3)
 
 
 def _drift_covariance(explained: VectorFit) -> Array:
-    """Return the bias drift's part (3, p, p) in the covariance of each axis' coefficients F, c (and G)."""
+    """Return the bias drift's part (3, p, p) in the covariance of each axis' p coefficients of the vector model."""
     inputs = explained.inputs
     gravity = None if explained.solution.g_sensitivity is None else inputs.apparent_gravity_m_s2
     design = design_matrix(inputs.rates_rad_s, gravity)

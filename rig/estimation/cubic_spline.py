@@ -92,7 +92,7 @@ def _end_condition(step: float, following: float, secant: Array, next_secant: Ar
 
 
 def _solve_tridiagonal(lower: Array, upper: Array, right: Array) -> Array:
-    """Solve lower s₋ + s + upper s₊ = right for s (n, k), s₋ and s₊ being its rows before and after.
+    """Return the solution s (n, k) of lower s₋ + s + upper s₊ = right, s₋ and s₊ being the rows before and after s.
 
     `lower` and `upper` are (n, 1). Parallel cyclic reduction (R. W. Hockney 1965): each pass eliminates the neighbours
     of a row, which then depends on rows twice as far away, with squared coefficients. The rows of a spline are

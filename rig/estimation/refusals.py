@@ -126,7 +126,7 @@ def check_duplicates(means: Array) -> None:
 
 
 def check_reads(matrix: Array) -> None:
-    """Raise Fault `stuck_sensor` if one row of F (3, 3), an axis, is much less sensitive than the others."""
+    """Raise Fault `stuck_sensor` if one axis, a row of `matrix` (3, 3), is much less sensitive than the others."""
     sizes = [math.hypot(*row) for row in matrix.tolist()]
     least = sizes.index(min(sizes))
     if sizes[least] < STUCK_RATIO * max(sizes):
@@ -238,7 +238,7 @@ def check_side(reference: Array, side: Array) -> None:
 
 
 def check_handedness(matrix: Array) -> None:
-    """Raise Fault `mirrored_axis` if F (3, 3) belongs to a left-handed sensor."""
+    """Raise Fault `mirrored_axis` if `matrix` (3, 3) belongs to a left-handed sensor."""
     if _is_left_handed(matrix):
         raise Fault(
             "mirrored_axis",

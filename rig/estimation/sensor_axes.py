@@ -21,7 +21,7 @@ IN_PAIR = np.abs(AXIS_ORDER)
 
 @dataclass(frozen=True, slots=True)
 class SensorAxes:
-    """The axes of F: `scale` (3,), `axes` (3, 3) with unit vectors as rows, and their nearest rotation `mounting`."""
+    """The axes of a sensor: `scale` (3,), unit vectors as rows of `axes` (3, 3), the nearest rotation `mounting`."""
 
     scale: Array
     axes: Array
@@ -29,7 +29,7 @@ class SensorAxes:
 
     @staticmethod
     def from_matrix(matrix: Array) -> "SensorAxes":
-        """Return the axes of `matrix` F (3, 3)."""
+        """Return the axes in a sensor's `matrix` (3, 3), each row of which is a unit vector over a scale factor."""
         scale = scale_of(matrix)
         axes = scale[:, None] * matrix
         return SensorAxes(scale, axes, nearest_rotation(axes))
@@ -41,7 +41,7 @@ class SensorAxes:
 
     @property
     def to_angles(self) -> Array:
-        """The derivative (6, 9) of non-orthogonality and mounting with respect to F, row by row."""
+        """The derivative (6, 9) of non-orthogonality and mounting with respect to the sensor's matrix, row by row."""
         return angle_jacobian(self.axes, self.scale, self.mounting)
 
     @property
@@ -51,13 +51,13 @@ class SensorAxes:
         return matrix
 
     def angles_covariance_rad2(self, of_matrix: Array) -> Array:
-        """Propagate the covariance (9, 9) of F, row by row, to the non-orthogonality and mounting (6, 6)."""
+        """Return the covariance (6, 6) of non-orthogonality and mounting, from that (9, 9) of the matrix, by rows."""
         to_angles = self.to_angles
         covariance: Array = to_angles @ of_matrix @ to_angles.T
         return covariance
 
     def non_orthogonality_std_rad(self, of_matrix: Array) -> Array:
-        """Return the standard deviations (3,) of the non-orthogonality, from the covariance (9, 9) of F."""
+        """Return the standard deviations (3,) of the non-orthogonality, from the covariance (9, 9) of the matrix."""
         std: Array = np.sqrt(np.diag(self.angles_covariance_rad2(of_matrix)))[:3]
         return std
 
@@ -76,9 +76,9 @@ def nearest_rotation(axes: Array) -> Array:
 
 
 def parameter_jacobian(matrix: Array, scale: Array) -> Array:
-    """Return the derivative (6, 12) of scale k and bias b = −c with respect to F, row by row, and c.
+    """Return the derivative (6, 12) of scale and bias with respect to `matrix` F, row by row, and the offset −bias.
 
-    k = 1/‖F_i‖ of axis i changes by δk = −k³ F_i·δF_i.
+    The scale factor k = 1/‖F_i‖ of axis i changes by δk = −k³ F_i·δF_i.
     """
     jacobian = np.zeros((6, 12))
     jacobian[:3, :9].reshape(3, 3, 3)[PAIR_INDICES, PAIR_INDICES] = -(scale**3)[:, None] * matrix
@@ -87,7 +87,7 @@ def parameter_jacobian(matrix: Array, scale: Array) -> Array:
 
 
 def angle_jacobian(axes: Array, scale: Array, rotation: Array) -> Array:
-    """Return the derivative (6, 9) of non-orthogonality and mounting `rotation` with respect to F, row by row.
+    """Return the derivative (6, 9) of non-orthogonality and mounting `rotation` with respect to the matrix F, by rows.
 
     A row a_i of the axes A changes by δa_i = k_i (I − a_i a_iᵀ) δF_i. The mounting R of A = S R changes by δR = [δθ]×
     R, in which (I tr S − S) δθ is the axial vector of M − Mᵀ with M = δA Rᵀ.

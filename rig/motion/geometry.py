@@ -174,7 +174,8 @@ def _find_bends(frames: list[Array]) -> tuple[Array, Array, Array]:
 
     The axes of these three joints are parallel except for the factory's calibration, so they intersect hundreds of
     metres away, and the origins of a calibrated arm's frames may be anywhere along them. Elbow and wrist 1 are
-    therefore taken where their axes meet the plane through the previous point at right angles to that joint's axis.
+    therefore the points at which their axes meet a plane through the previous point. This plane is at right angles to
+    the previous joint's axis.
     """
     shoulder = frames[1][..., :3, 3]
     elbow = _nearest_origin(shoulder, frames[1][..., :3, 2], frames[2])

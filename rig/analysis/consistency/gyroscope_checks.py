@@ -106,7 +106,7 @@ def check_gyroscope(
     """Return the tests of a gyroscope's model against each alternative, the outlying sweeps, and the detection limits.
 
     Faults that persist (`changes`) are tested on the segments and the transfers between them, `differences` on the
-    segments alone. Each test has the given false-alarm probability; `matrix` (3, 3) is F.
+    segments alone. Each test has the given false-alarm probability; `matrix` (3, 3) is the gyroscope's.
     """
     segments = _steady_rates(segments, matrix)
     allowance = replace(allowance, transfers=_steady_rates(allowance.transfers, matrix))
@@ -165,8 +165,8 @@ def predict_detection_limits(
 ) -> dict[str, float]:
     """Return the minimal detectable size of each fault mode, by its name, in planned segments.
 
-    `matrix` (3, 3) is F; `allowance` contains the known errors and the transfers. The bias drifts only by its
-    instability (flicker), because no readings show a random walk or scatter.
+    `matrix` (3, 3) is the gyroscope's; `allowance` contains the known errors and the transfers. The bias drifts only by
+    its instability (flicker), because no readings show a random walk or scatter.
     """
     bias = BiasProcess(instability_rad_s=allowance.instability_rad_s)
     scatter = _build_scatter(segments, allowance.patterns_rad_s, allowance)
@@ -260,7 +260,7 @@ def _whiten_with_transfers(
 def _detection_limits(
     segments_only: _TestedSegments, with_transfers: _TestedSegments, false_alarm_probability: float
 ) -> Iterator[tuple[str, float]]:
-    """Yield the name of every fault mode with the size that its check detects, on the segments of `check_gyroscope`."""
+    """Yield the name of every fault mode, with the minimal size that its check detects."""
     segments, chance = segments_only.segments, critical_value(false_alarm_probability)
     steps, sweeps = step_columns(segments), distinct(segments.sweep[segments.sweep >= 0]).tolist()
     of_transfers, of_segments = (

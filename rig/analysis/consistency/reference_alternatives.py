@@ -99,9 +99,9 @@ def _axis_components(model: ReferenceModel) -> Array:
 
 
 def _bend_pattern(change: Callable[[Array], Array]) -> Callable[[ReferenceModel], Array]:
-    """Return a function that returns a model's patterns if the error of each axis is `change` of its force.
+    """Return a function from a model to the patterns of an error of each axis that depends on the force along it.
 
-    `change` takes and returns multiples of the reference.
+    `change` takes this force and returns the error, both as multiples of the reference.
     """
 
     def patterns(model: ReferenceModel) -> Array:

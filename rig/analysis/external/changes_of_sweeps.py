@@ -30,7 +30,7 @@ def check_sweeps_steady(data: ExternalData) -> None:
 
 
 def estimate_changes(data: ExternalData, matrix: Array) -> Array:
-    """Return the covariance (12, 12) that the changes over the rows add to F (`matrix`, row by row) and bias.
+    """Return the covariance (12, 12) that the changes over the rows add to `matrix`, row by row, and bias.
 
     The covariance includes an abrupt change, and bias changes from rest to rest; it is zero if the rows show no change.
     """

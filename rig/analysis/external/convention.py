@@ -29,7 +29,7 @@ MIN_VERTICAL_GRAVITY = 0.97  # component along the vertical axis of the room
 
 @dataclass(frozen=True, slots=True)
 class Convention:
-    """The convention by which the gyroscope explains most of the attitudes' rates, namely the fraction `explained`.
+    """A convention of quaternions, with the fraction `explained` of the attitudes' rates that the gyroscope confirms.
 
     - scalar_last: the columns read as qw qx qy qz contain qx qy qz qw.
     - inverse: the quaternions take room to body coordinates; None if the motion does not show it.

@@ -324,7 +324,7 @@ def _gyroscope(item: Item, result: Result, clock: TimeBase | None) -> SensorResu
 
 
 def _describe_as_swept(result: Result) -> TurnedSolution:
-    """Return a solution of reading = F ω + b in the form of a solution of rate = scale × (reading + bias)."""
+    """Return a solution in which the bias is a part of the reading in the form of rate = scale × (reading + bias)."""
     solution, matrix = result.solution, result.solution.matrix
     axes = SensorAxes.from_matrix(matrix)
     of_matrix = np.r_[F, OFFSET]

@@ -94,7 +94,7 @@ def sweep_errors(solution: VectorSolution, data: ExternalData) -> SweepErrors | 
     rate_variance, axis_variance = sizes.median_variances
 
     def inflate(to_values: Array, dof: float, noise_dof: float) -> Array:
-        """Return the covariance (q, q), without noise, of values whose derivatives by F and c are `to_values` (q, 12).
+        """Return the covariance (q, q), without noise, of values with the derivatives `to_values` by matrix and offset.
 
         The covariance is that of motion errors of the median size. For each value it is scaled so that, together with
         the noise, it gives the expanded uncertainty that follows from the posterior distribution of the errors' sizes.
@@ -148,7 +148,7 @@ def add_errors(solution: VectorSolution, data: ExternalData) -> VectorSolution:
 
 
 def _derivatives(design: Array, means: Array, variances: Array) -> Array:
-    """Return the derivative (12, N, 3) of F, row by row, then c, with respect to each mean reading."""
+    """Return the derivative (12, N, 3) of matrix, row by row, and offset with respect to each mean reading."""
     _, inverse = regress(design, means, variances)  # (3, 4, N)
     order, _ = index_coefficients(4)  # F row by row, then c
     gain = np.zeros((3, 4, len(means), 3))

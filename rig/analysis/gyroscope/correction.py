@@ -31,10 +31,10 @@ class Correction:
 
 
 def diagonal_correction(scale: Array) -> Correction:
-    """Return the matrix M = K of scale factors (3,), assuming orthogonal axes."""
+    """Return the correction by the scale factors (3,) alone, which assumes orthogonal axes."""
     return Correction("diagonal", np.diag(scale))
 
 
 def matrix_correction(solution: "VectorSolution | TurnedSolution") -> Correction:
-    """Return M = R F⁻¹: the rates in the orthogonal frame nearest to the sensor's axes."""
+    """Return the correction of readings to rates in the orthogonal frame nearest to the sensor's axes."""
     return Correction("matrix", solution.mounting @ np.linalg.inv(solution.matrix))

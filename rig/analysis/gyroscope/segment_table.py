@@ -48,7 +48,7 @@ class Segments:
 def stack_segments(windows: Sequence[SegmentedAverage], explained: VectorFit, site: Site) -> Segments:
     """Return the segments of a gyroscope's windows, in the order of the means of `explained`.
 
-    The Earth's rate is that in `explained`, estimated or of the site.
+    The Earth's rate is the one in `explained`, which was either estimated or taken from the site.
     """
     inputs = explained.inputs
     placed = list(zip(windows, inputs.windows_s[:, 0], inputs.acceleration_m_s2, strict=True))

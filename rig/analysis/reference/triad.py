@@ -76,7 +76,7 @@ def stack_dwells(dwells: Sequence[DwellReading | StaticReading], mounting: Array
 
 
 def check_mounted(matrix: Array) -> None:
-    """Raise Fault `swapped_axes`, `mirrored_axis` or `wrong_mounting` if F contradicts the nominal mounting."""
+    """Raise Fault `swapped_axes`, `mirrored_axis` or `wrong_mounting` if `matrix` contradicts the nominal mounting."""
     check_axes(SensorAxes.from_matrix(matrix).axes, np.eye(3))
 
 

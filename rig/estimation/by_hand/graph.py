@@ -64,8 +64,8 @@ class GraphState:
     - nonlinearities: the even and the odd nonlinearity (6,), s/rad.
     - drift_rad_s (2, 3): row 0 is the bias' steady drift from the first rest to the last, row 1 the deviation from it
       at half time.
-    - level: F_a (3, 3) of the accelerometer.
-    - offset: b_a (3,) of the accelerometer, m/s².
+    - level: the accelerometer's matrix F_a (3, 3).
+    - offset: the accelerometer's offset b_a (3,), m/s².
     - table: the table's tilt (2,), rad.
     - normals: the tilt of each face relative to its nominal normal (6, 2), rad.
     - attitudes: the attitudes (N, 3, 3) at the rests, body to table.

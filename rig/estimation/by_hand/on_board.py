@@ -58,7 +58,7 @@ class BoardMove:
 class BoardSolution:
     """The solution of the board's equations: `matrix` C and `bias_rad_s` −b, so that rate = matrix (reading + bias).
 
-    `scale_std` is the largest standard uncertainty on the diagonal of C.
+    `scale_std` is the largest standard uncertainty of the matrix' diagonal elements.
     """
 
     matrix: Array

@@ -195,7 +195,7 @@ def summarise_fit(fit: GraphFit, warnings: tuple[str, ...] = ()) -> HandSolution
 
 
 def parameter_columns(fit: GraphFit) -> NDArray[np.intp]:
-    """Return the columns (12,) of F and of the last rest's bias among all unknowns."""
+    """Return the columns (12,), among all unknowns, of the gyroscope's matrix and of the last rest's bias."""
     count = fit.covariance.shape[0]
     return np.asarray(np.r_[0:9, count - 3 : count])
 
@@ -272,7 +272,8 @@ def _find_first_face(session: HandRecording, conditions: SessionConditions, but:
 def _budget(fit: GraphFit, to_parameters: Array, clock: Array) -> Budget:
     """Return the budget of scale and bias.
 
-    `to_parameters` (6, 12) maps F and b to scale and bias; `clock` (6, 6) is the covariance due to the clock's error.
+    `to_parameters` (6, 12) maps the fitted matrix and bias to scale and bias; `clock` (6, 6) is the covariance due to
+    the clock's error.
     """
     chosen = parameter_columns(fit)
     covariances = {name: np.zeros((6, 6)) for name in CONTRIBUTORS}

@@ -38,10 +38,10 @@ class AbruptChange:
     evidence: float
 
     def find_covariance(self, matrix: Array) -> Array:
-        """Return the covariance (12, 12) of F row by row, then bias, that the change adds; `matrix` (3, 3) is F.
+        """Return the covariance (12, 12) that the change adds to the sensor's `matrix`, row by row, and to its bias.
 
-        A solution lies between the sensor's states before and after. Half of the change is the standard uncertainty,
-        so that U, the whole change, covers both states.
+        A solution lies between the sensor's states before and after. Half of the change is the standard uncertainty, so
+        that U, the whole change, covers both states.
         """
         half = np.zeros((12, 3))
         if self.what == "bias":

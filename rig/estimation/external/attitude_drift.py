@@ -115,7 +115,7 @@ class FixedAttitudes:
     """The terms of the module's equation at N fixes and at k samples.
 
     - `attitudes` (N, 3, 3), `samples` (k, 3, 3): the reference's attitude E relative to the gyroscope's.
-    - `sensitivities` (N, 3, 12): derivatives S of the gyroscope's attitude with respect to F and b.
+    - `sensitivities` (N, 3, 12): derivatives S of the gyroscope's attitude with respect to its matrix and bias.
     - `turning` (N, 3), `rates` (k, 3): the rate C ω at the fixes, and at the samples.
     - `middles_s` (N,), `windows_s` (N, 2): middle, and start and end, of each fix.
     """
@@ -301,7 +301,7 @@ def correlate_effects(effects: Array, correlation: Array) -> Array:
 
 
 def _find_matrix_changes(sensitivities: Array, nearby: Array) -> Array:
-    """Return the covariance (3n, 3n) of the increments if F's elements vary with attitude by one unit.
+    """Return the covariance (3n, 3n) of n increments if the elements of the matrix F vary with attitude by one unit.
 
     `nearby` (n, n) is the correlation between the increments. Causes of such a variation are the sensor's nonlinearity,
     its sensitivity to gravity, and gears in the reference.
@@ -325,7 +325,7 @@ def _weigh_bias(averaged: FixedAttitudes, fixes: Fixes) -> Array:
 def _find_bias_changes(sensitivities: Array, nearby: Array, middles_s: Array, weights: Array) -> Array:
     """Return the covariance (3n, 3n) of the increments due to unit changes of the bias b with attitude and time.
 
-    `sensitivities` (n, 3, 12) are derivatives of the increments with respect to F and b, `nearby` (n, n) is the
+    `sensitivities` (n, 3, 12) are derivatives of the increments with respect to matrix and bias, `nearby` (n, n) is the
     correlation due to similar attitudes, `middles_s` (n,) are the middle times. Changes are relative to the mean bias
     with `weights` (n,).
     """

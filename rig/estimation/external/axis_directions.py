@@ -78,7 +78,7 @@ def _weigh_sizes(sizes_rad: Array, values: Array, scores: Array) -> Array:
 
 
 def find_inclinations(averaged: FixedAttitudes, fixes: Fixes, matrix: Array) -> Inclinations:
-    """Return the inclinations of the axes about which the body turned between fixes, with F `matrix` (3, 3).
+    """Return the inclinations of the axes about which the body turned between fixes, for a gyroscope with `matrix`.
 
     Inclinations vary smoothly with the axis in body coordinates: their correlation is Matérn's function, ν = 3/2, of
     the distance between the axes.

@@ -20,7 +20,7 @@ def find_increment_change(
     """Return the abrupt change that the increments show, None if they show none.
 
     `model` describes the increments between `fixes`, with the errors' most probable standard deviations `std` (k,);
-    `matrix` (3, 3) is F. The change's time is on the attitudes' clock.
+    `matrix` (3, 3) is the gyroscope's. The change's time is on the attitudes' clock.
     """
     sensitivities = np.diff(averaged.sensitivities, axis=0)[fixes.joined]
     of_rows = sensitivities[..., MATRIX].reshape(-1, 3, 3, 3)  # sensitivities to F's elements, by row and column

@@ -85,8 +85,8 @@ class EarthRateEstimate:
 class IncrementSolution:
     """A gyroscope's matrix and bias from its increments, with their covariance and variance components.
 
-    - matrix (3, 3), bias (3,): F, the scale factors and axes; b, the reading at rest.
-    - covariance (15, 15): of F row by row, the Earth's rate, b.
+    - matrix (3, 3): the scale factors and axes; bias (3,): the reading at rest.
+    - covariance (15, 15): of the matrix row by row, the Earth's rate, and the bias, in this order.
     - causes: parts (15, 15) of the covariance, by name.
     - earth: the Earth's rate from the increments, or the Fault that says why it is not determined.
     - clock_s, clock_std_s: the reference's attitude with the time stamp t belongs to the readings' time t + `clock_s`.
@@ -213,7 +213,7 @@ def _limit_outliers(fixes: Fixes) -> float:
 
 
 def _conditioning(mixed: Mixed) -> refusals.Conditioning:
-    """Return the conditioning of the design, with F and b scaled to the same size."""
+    """Return the conditioning of the design, with its columns for matrix and bias scaled to the same size."""
     columns = mixed.design[:, : BIAS.stop]
     sizes = [np.linalg.norm(columns[:, block]) for block in (MATRIX, BIAS)]
     return refusals.condition_of(columns / np.repeat(sizes, [9, 3]), BIAS.stop)

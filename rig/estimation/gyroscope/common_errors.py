@@ -34,7 +34,7 @@ MAX_ITERATIONS = 2  # B depends on F, and the first F is already within one perc
 
 @dataclass(frozen=True, slots=True)
 class CommonErrors:
-    """The best linear unbiased prediction of the errors.
+    """The best linear unbiased prediction of P errors that are common to N mean readings.
 
     `sizes` (P,) are in prior standard deviations, with the posterior `covariance` (P, P); `readings_rad_s` (N, 3) are
     the effects of the errors on the mean readings.
@@ -47,7 +47,7 @@ class CommonErrors:
 
 @dataclass(frozen=True, slots=True)
 class Prediction:
-    """The common errors predicted with the last estimate of F, and the arrays from which they follow.
+    """The common errors, predicted with the last estimate of the gyroscope's matrix, and arrays for their use.
 
     - `patterns_rad_s` (P, N, 3): the effect of one standard deviation of each error on the readings.
     - `gain` (P, N, 3): the map from the means to the sizes of the errors.
@@ -95,7 +95,7 @@ class CommonErrorModel:
         return prediction
 
     def fit_matrix(self, effect_rad_s: Array | float, shared_covariance_rad2_s2: Array | None = None) -> Array:
-        """Return F (3, 3) from the means minus the effect (N, 3) of common errors."""
+        """Return the gyroscope's matrix F (3, 3) from the means minus the effect (N, 3) of common errors."""
         coefficients, *_ = fit_coefficients(
             self.design,
             self.means_rad_s - effect_rad_s,

@@ -174,7 +174,7 @@ class _EarthRateFit:
 def _fit(
     inputs: VectorInputs, mounting: Array, directions: Array, gravity: Array | None, prior: EarthRatePrior
 ) -> _EarthRateFit:
-    """Return the fit of F, c, G and common errors; the last d errors are the Earth's rate along `directions` (d, 3)."""
+    """Return the fit of the vector model with common errors; the last ones are the Earth's rate along `directions`."""
     speeds = np.linalg.norm(inputs.turns_rad_s, axis=1)
     durations = np.diff(inputs.windows_s).T[0]
     by_states = np.sqrt(2) * prior.state_jitter_s * inputs.state_gains / durations * speeds
@@ -251,7 +251,8 @@ def _check_identifiable(inputs: VectorInputs, directions: Array, gravity: Array 
 def _condition(inputs: VectorInputs, directions: Array, gravity: Array | None) -> tuple[refusals.Conditioning, int]:
     """Return the conditioning of the design, in blocks of unit RMS, and the number of its columns.
 
-    There are 3 p columns of the sensor, for F, c (and G), and d of the Earth's rate, for its `directions` (d, 3).
+    The columns are those of the sensor's coefficients, for matrix, offset and, with `gravity`, g-sensitivity, and one
+    for each of the `directions` (d, 3) of the Earth's rate.
     """
     sweeps = inputs.turns_rad_s / (np.linalg.norm(inputs.turns_rad_s) / len(inputs.turns_rad_s) ** 0.5 or 1.0)
     scaled_gravity = None if gravity is None else gravity / (np.linalg.norm(gravity) / len(gravity) ** 0.5)

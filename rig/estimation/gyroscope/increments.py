@@ -38,8 +38,8 @@ class IntegratedAttitudes:
     """A gyroscope's integrated attitudes at k instants, in increasing order.
 
     - `attitudes` (k, 3, 3): C, from body coordinates to those of the first reading.
-    - `sensitivities` (k, 3, 12): S, derivative of C's rotation with respect to F (row by row) and b, in coordinates of
-      the first reading.
+    - `sensitivities` (k, 3, 12): S, derivative of C's rotation with respect to the gyroscope's matrix F (row by row)
+      and bias b, in coordinates of the first reading.
     - `rates_rad_s` (k, 3) in body coordinates.
     """
 
@@ -52,7 +52,7 @@ class IntegratedAttitudes:
 class Track:
     """Integrated attitudes (n, 3, 3), rates (n, 3) at each of n readings, and the `sensitivity` (3, 12) at the last.
 
-    The sensitivity is S of `IntegratedAttitudes`.
+    The sensitivity is defined as in `IntegratedAttitudes`.
     """
 
     attitudes: Array
@@ -65,8 +65,8 @@ class Increments:
     """The body's rotation between w pairs of instants.
 
     - `rotations` (w, 3, 3): each maps body coordinates at the end to those at the start.
-    - `jacobian` (w, 3, 12): J. A change δθ of F (row by row) and b turns `rotations` R into exp(J δθ) R; J is in
-      body coordinates at the start.
+    - `jacobian` (w, 3, 12): J. A change δθ of the gyroscope's matrix (row by row) and bias turns `rotations` R into
+      exp(J δθ) R; J is in body coordinates at the start.
     """
 
     rotations: Array
@@ -74,10 +74,10 @@ class Increments:
 
 
 def integrate_attitudes(time_s: Array, readings: Array, matrix: Array, bias: Array, at_s: Array) -> IntegratedAttitudes:
-    """Integrate rates to attitudes at the instants `at_s` (k,).
+    """Return the attitudes at the instants `at_s` (k,), integrated from a gyroscope's readings.
 
-    Readings (n, 3) in rad/s at times (n,) are corrected by F (3, 3) and b (3,). Raise ValueError unless times increase
-    strictly and instants increase within them.
+    Readings (n, 3) in rad/s at times (n,) are corrected by the gyroscope's `matrix` (3, 3) and `bias` (3,). Raise
+    ValueError unless times increase strictly and instants increase within them.
     """
     if len(at_s) and (at_s[0] < time_s[0] or at_s[-1] > time_s[-1] or (np.diff(at_s) < 0).any()):
         raise ValueError("instants must rise, and lie within the readings' times")
@@ -151,9 +151,10 @@ def _find_slopes(time_s: Array, rates: Array) -> _Interval:
 
 
 def _integrate_block(interval: _Interval, at_s: Array, inverse: Array) -> tuple[Array, Array, Array]:
-    """Return C and S, integrated from the start of a block to each time in `at_s` (k,) and to its end, and the rates.
+    """Return attitudes (k + 1, 3, 3), sensitivities (k + 1, 3, 12) and rates (k, 3) of a block.
 
-    C is (k + 1, 3, 3), S (k + 1, 3, 12); the rates (k, 3) are those at `at_s`.
+    They are C, S and ω of `IntegratedAttitudes`, integrated from the start of the block to each time in `at_s` (k,) and
+    to the end of the block; the rates are those at `at_s`.
     """
     before = np.clip(np.searchsorted(interval.time_s, at_s, side="right") - 1, 0, len(interval.time_s) - 2)
     whole = _whole_steps(interval)
@@ -183,7 +184,7 @@ class _IncrementSteps:
         return np.asarray(-_matrices(self.vectors / 2) @ inverse, dtype=np.float64)
 
     def sensitivities(self, attitudes: Array, inverse: Array) -> Array:
-        """Return the contribution (k, 3, 12) of each step to S; the steps start at `attitudes` (k, 3, 3)."""
+        """Return the contribution (k, 3, 12) of each step to the sensitivities; steps start at `attitudes`."""
         per_rate_error = (attitudes @ self.differentiate(inverse))[..., None]
         per_matrix = (per_rate_error * self.integrals_rad[:, None, None, :]).reshape(-1, 3, 9)
         return np.concatenate([per_matrix, per_rate_error[..., 0] * self.durations_s[..., None]], axis=2)

@@ -32,8 +32,8 @@ def propagate_mount_squares(explained: VectorFit) -> Array:
 def _find_curvatures(explained: VectorFit, turns_rad: Array) -> Array:
     """Return the second derivatives (6, E, E) of scale and bias with respect to E mount errors in prior stds.
 
-    The mount errors change the estimate of F to F + D + S, with D of first and S of second order. The second derivative
-    of k = 1/‖row of F‖ has a part linear in S and a part quadratic in D.
+    The mount errors change the estimated matrix F to F + D + S, with D of first and S of second order. The second
+    derivative of the scale factor 1/‖row of F‖ has a part linear in S and a part quadratic in D.
     """
     inputs, matrix = explained.inputs, explained.solution.matrix
     inverse = _find_regression(explained)  # (3, 4, N)
@@ -51,7 +51,7 @@ def _find_curvatures(explained: VectorFit, turns_rad: Array) -> Array:
 
 
 def _find_regression(explained: VectorFit) -> Array:
-    """Return the linear map (3, 4, N) from mean readings to each row of F and its offset, with the mounts fixed."""
+    """Return the linear map (3, 4, N) from mean readings to each axis' row of the matrix and offset, mounts fixed."""
     inputs, solution, bias = explained.inputs, explained.solution, explained.bias
     design = design_matrix(inputs.rates_rad_s, None if solution.g_sensitivity is None else inputs.apparent_gravity_m_s2)
     of_speed = propagate_speed_std(inputs.rates_rad_s, inputs.speed_std_rad_s, solution.matrix)

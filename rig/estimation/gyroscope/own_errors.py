@@ -61,11 +61,12 @@ def list_own_errors(
 ) -> Iterator[OwnError]:
     """Yield the errors due to nonlinearity and temperature in the means of N windows (N, 2) of sweeps and rests.
 
-    `matrix` (3, 3) is F, `turns_rad_s` (N, 3) are the rates, zero in a rest. If all sweeps have one speed, the scale
-    refers to this speed along an axis: an oblique rotation has a lower rate along the axis, so its scale may differ.
-    With several speeds the vector model estimates the nonlinearity, so it is not yielded. The change of temperature is
-    relative to the mean over all windows for the bias, and to the mean over the sweeps for the scale. The first three
-    of its patterns (6, N, 3) are for the recorded change, the others for the change that the thermometer hides.
+    `matrix` (3, 3) is the gyroscope's; `turns_rad_s` (N, 3) are the rates, zero in a rest. If all sweeps have one
+    speed, the scale refers to this speed along an axis. An oblique rotation has a lower rate along the axis, for which
+    the scale may differ. With several speeds the vector model estimates the nonlinearity, so it is not yielded. The
+    change of temperature is relative to the mean over all windows for the bias, and to the mean over the sweeps for the
+    scale. The first three of the temperature's patterns (6, N, 3) are for the recorded change, the others for the
+    change that the thermometer hides.
     """
     if len(speeds_rad_s) == 1:
         unit_curves = nonlinear_effects(matrix, turns_rad_s, sensor.full_scale_rad_s, speeds_rad_s[0])

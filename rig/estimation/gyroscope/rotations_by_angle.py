@@ -138,7 +138,7 @@ class _TurnsEstimate:
 def solve_turned(
     gyroscope: Gyroscope, turns: Sequence[Turn], means: Sequence[RateMean], matrix: Array, bias_rad_s: Array
 ) -> TurnedSolution:
-    """Solve the turns' equations for F and c by Gauss–Newton steps from `matrix` (3, 3) and `bias_rad_s` (3,).
+    """Return the gyroscope's calibration from turns and means, by Gauss–Newton steps from `matrix` and `bias_rad_s`.
 
     Raise Fault `rank_deficient`, `ill_conditioned`, `turn_not_closed`, `wrong_unit`, `mirrored_axis`.
     """
@@ -209,7 +209,7 @@ def _equate_mean(mean: RateMean, gyroscope: Gyroscope, state: _TurnsEstimate) ->
 def _equate_rotation(
     turn: Turn, rotation: Array, jacobian: Array, gyroscope: Gyroscope, state: _TurnsEstimate
 ) -> _ObservationEquations:
-    """Return a turn's five equations: three for the integrated `rotation`, two for the mean reading across F n."""
+    """Return a turn's five equations: three for the integrated `rotation`, two for the mean reading across the axis."""
     from scipy.spatial.transform import Rotation
 
     time_s = gyroscope.time_s

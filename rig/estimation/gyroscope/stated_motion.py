@@ -43,7 +43,7 @@ class StatedMotion:
     def from_residuals(
         residuals_rad_s: Array, rates_rad_s: Array, variances_rad2_s2: Array, matrix: Array
     ) -> "StatedMotion":
-        """Return the motion with the patterns of its errors for a gyroscope with F (3, 3); shapes as in the fields."""
+        """Return the motion with the patterns of its errors for a gyroscope with this `matrix` (3, 3)."""
         speeds = np.linalg.norm(rates_rad_s, axis=1)
         tilts = np.zeros((2, *rates_rad_s.shape))
         for row in np.flatnonzero(speeds):

@@ -120,7 +120,7 @@ class VectorInputs:
         return np.concatenate([none, *(kind for kind in kinds if kind is not None)])
 
     def list_own_errors(self, matrix: Array) -> tuple[OwnError, ...]:
-        """Return the sensor's errors that the model does not contain, for F (3, 3)."""
+        """Return the sensor's errors that the model does not contain, for a sensor with this `matrix` (3, 3)."""
         if self.sensor is None:
             return ()
         rounded = rounding_errors(self.means_rad_s, self.roundings_rad_s, self.variances_rad2_s2)

@@ -197,7 +197,7 @@ def fit_coefficients(
 
 
 def check_matrix(matrix: Array, nominal_mounting: Array | None) -> SensorAxes:
-    """Return the axes of F (3, 3). Raise Fault for an F that `solve_vector_model` refuses."""
+    """Return the axes in a gyroscope's `matrix` (3, 3). Raise Fault for a matrix that `solve_vector_model` refuses."""
     check_reads(matrix)
     axes = SensorAxes.from_matrix(matrix)
     check_unit(axes.scale)
@@ -289,7 +289,7 @@ def _raw_covariance(inverse: Array, variances: Array, speed_noise: Array | None,
 
 @cache
 def index_coefficients(columns: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the coefficients' indices: (12,) of F, row by row, and c; then the indices of G."""
+    """Return the coefficients' indices: (12,) of matrix, row by row, and offset; then those of the g-sensitivity."""
     index = np.arange(3 * columns, dtype=np.intp).reshape(3, columns)
     return np.concatenate([index[:, :3].ravel(), index[:, 3]]), index[:, 4:].ravel()
 

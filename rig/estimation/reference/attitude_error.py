@@ -123,7 +123,7 @@ def find_worst_attitude(start: Array, placed: AttitudeReadings, fit: AttitudeWei
 
 
 def effects(theta: Array, attitudes: Array, v_bar: Array) -> Array:
-    """Return E (N, 3, 3): the change of each reading due to a small rotation of its attitude."""
+    """Return the derivatives E (N, 3, 3) of the readings with respect to small rotations of their attitudes."""
     reference = np.einsum("nji,j->ni", attitudes, theta[REFERENCE])
     cross = np.zeros((len(attitudes), 3, 3))
     x, y, z = reference.T
@@ -136,7 +136,10 @@ def effects(theta: Array, attitudes: Array, v_bar: Array) -> Array:
 
 
 def find_whiteners(variances: Array, rotations: Array, std_rad: Array) -> Array:
-    """Return whiteners (N, 3, 3) for noise `variances` (N, 3) and attitude errors `std_rad` (N,); `rotations` are E."""
+    """Return whiteners (N, 3, 3) for noise `variances` (N, 3) and attitude errors `std_rad` (N,).
+
+    `rotations` (N, 3, 3) are the effects of small rotations on the readings.
+    """
     scaled = rotations * std_rad[:, None, None]
     covariance = np.eye(3) * variances[:, :, None] + scaled @ np.swapaxes(scaled, -1, -2)
     return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)), dtype=np.float64)

@@ -25,7 +25,7 @@ FALSE_ALARM_PROBABILITY = 1e-3  # of one of the two tests, for a steady, uniform
 
 
 def hard_iron(solution: TriaxialSolution) -> Array:
-    """Return F⁻¹ b (3,), the field that changes the readings by as much as the `solution`'s bias b."""
+    """Return the field (3,) that changes the readings by as much as the bias of the `solution`."""
     return np.asarray(np.linalg.solve(solution.matrix, solution.bias), dtype=np.float64)
 
 

@@ -128,7 +128,7 @@ def select_sweeps(movement: Movement) -> Array:
 
 
 def repeat_by_segment(values: Array, movement: Movement) -> Array:
-    """Return `values` (N + M,) of segments as values (K,) of readings, three for each sweep."""
+    """Return `values` (N + M,) of N dwells and M sweeps as values (N + 3 M,) of their readings."""
     dwells = len(movement.dwells.readings_m_s2)
     return np.concatenate([values[:dwells], np.repeat(values[dwells:], 3)])
 

@@ -98,7 +98,7 @@ def fewest_dof(response: Array, variances: Array, dof: Array) -> float:
 
 
 def response_in_attitudes(solution: TriaxialSolution, dwells: Dwells) -> Array:
-    """Return the derivative (15, 3 N) of the parameters F, v_ref and b with respect to the readings."""
+    """Return the derivative (15, 3 N) of the parameters (matrix, reference, bias) with respect to the readings."""
     theta, v_bar = solution.theta[: SECOND.start], np.zeros_like(dwells.variances_m2_s4)
     std_rad = np.full(len(v_bar), solution.attitude_std_rad)
     whiteners = find_whiteners(dwells.variances_m2_s4, effects(theta, dwells.attitudes, v_bar), std_rad)

@@ -39,7 +39,7 @@ def stack(readings: Array, attitudes: Array, squares: Array | None) -> Array:
 
 
 def column_sizes(readings: Array, squares: Array | None) -> Array:
-    """Return the root-mean-square size (…, 15 or 18) of each block of columns of X."""
+    """Return the root-mean-square size (…, 15 or 18) of the block to which each column of the design belongs."""
     sizes = np.ones((*readings.shape[:-2], 15 if squares is None else 18))
     sizes[..., F] = np.sqrt(np.mean(readings**2, axis=(-2, -1)))[..., None]
     sizes[..., REFERENCE] = np.sqrt(1 / 3)

@@ -240,7 +240,7 @@ def _conditioning(scaled: Array, m: Array, v: Array, needed: int) -> refusals.Co
 
 
 def _errors_in_x(m: Array, v: Array, method: Method) -> tuple[str, ...]:
-    """Return a warning if noise in X biases the published estimate by more than its standard deviation."""
+    """Return a warning if noise in the design biases the published estimate by more than its standard deviation."""
     if method != "as_published" or len(m) * v.mean() < MIN_NOISE_BIAS_RATIO**2 * np.mean(m**2):
         return ()
     return ("noise in the readings biases the published estimate; maximum_likelihood does not suffer from it",)

@@ -74,8 +74,8 @@ def joint_factors(values: int, dof: ArrayLike, probability: float) -> Array:
 def find_ellipsoid_factor(values: int, dof: ArrayLike) -> float:
     """Return the factor of the joint 95 % ellipsoid of `values` values, at the smallest of `dof`.
 
-    For p values with a multivariate t distribution the factor is √(p F), with the quantile of F for p and ν degrees of
-    freedom; for a normal distribution √χ² (JCGM 102, 6.5).
+    For p values with a multivariate t distribution the factor is the root of p times the quantile of the F distribution
+    for p and `dof` degrees of freedom; for a normal distribution it is the root of the quantile of χ² (JCGM 102, 6.5).
     """
     fewest = float(np.min(_round_down(dof)))
     if math.isinf(fewest):
@@ -106,6 +106,6 @@ def effective_dof(variances: ArrayLike, dof: ArrayLike) -> Array:
 
 
 def _round_down(dof: ArrayLike) -> Array:
-    """Return ν as tabulated: the next lower whole number (JCGM 100, G.6.4), at least one."""
+    """Return degrees of freedom as tabulated: the next lower whole number (JCGM 100, G.6.4), at least one."""
     rounded: Array = np.floor(np.maximum(np.asarray(dof, dtype=np.float64) * (1 + DOF_TOLERANCE), 1.0))
     return rounded

@@ -40,11 +40,12 @@ FAILED_LOG_POSTERIOR = 1e30  # negative, if it cannot be computed
 
 @dataclass(frozen=True, slots=True)
 class Mixed:
-    """The model of `observed` (m,), y in the module's equation.
+    """The model of observations, `observed` (m,) = `design` (m, p) × coefficients + errors.
 
-    - `design` (m, p): X; `precision` (p,): the prior precision of each coefficient θ, 0 if none.
-    - `fixed` (m, m): C₀; `components` (k, m, m): A of each cause; `scales` (k,): the medians of the half-Cauchy priors
-      of the causes' σ.
+    - `precision` (p,): the prior precision of each coefficient, 0 if none.
+    - `fixed` (m, m): the known part of the errors' covariance; `components` (k, m, m): the covariance for each of k
+      causes of errors with the standard deviation 1.
+    - `scales` (k,): the medians of the half-Cauchy priors of the causes' standard deviations.
     - `alone` (k, 2): sum of squares and dof of each cause's residuals, measured separately from y; 0 if not measured.
     """
 
@@ -217,7 +218,7 @@ class MixedModel:
         return find_half_width(np.array(offsets), np.array(variances), weights)
 
     def _whiten(self, std: Array) -> tuple[Array, Array, Array, Array, float]:
-        """Return L of the errors' covariance L Lᵀ, whitened design and observations, information and log-likelihood."""
+        """Return the Cholesky factor, whitened design, whitened observations, information and log-likelihood."""
         from scipy.linalg.lapack import dpotrf, dtrtrs  # without the checks of `solve_triangular`, which take longer
 
         mixed = self.mixed
@@ -235,7 +236,7 @@ class MixedModel:
         return lower, design, observed, information, -0.5 * (determinant + square)
 
     def _project(self, lower: Array, information: Array) -> tuple[Array, Array]:
-        """Return the P (m, m) and P y (m,) of `restrict`, from the L (m, m) and the information (p, p) of `_whiten`."""
+        """Return the result of `restrict`, from the Cholesky factor (m, m) and the information (p, p) of `_whiten`."""
         from scipy.linalg.lapack import dpotri
 
         half = dpotri(lower, lower=1)[0]
@@ -286,7 +287,7 @@ class MixedModel:
 
 
 def sample_adaptively(log_density: Callable[[Array], float], begins: Sequence[tuple[Array, Array]]) -> Array:
-    """Draw s samples of k variables, call the log-density at each, and return their weights (s,) in the same order.
+    """Return the weights (s,) of s samples of k variables, in the order in which `log_density` is called for them.
 
     Adaptive multiple importance sampling (Cornuet et al., Scand. J. Stat. 39 (2012) 798) begins at each maximum (k,) of
     `begins` with the curvature (k, k) there; each further round draws from Student's t with the mean and covariance of
