@@ -23,7 +23,7 @@ def find_creeping_rests(fit: GraphFit) -> tuple[int, ...]:
 
     Only a rest between two used rests can be identified, because elsewhere a creep looks like a jump of the bias. If a
     jump before or after such a rest explains the readings as well, which happens on faces that occur once, no rest is
-    returned: the two causes lead to different biases.
+    returned, because the two causes lead to different biases.
     """
     if fit.stds.walk_rad_s_sqrt_s <= MAX_WALK_RATIO * STATED.walk_rad_s_sqrt_s:
         return ()

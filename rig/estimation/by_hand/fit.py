@@ -67,7 +67,7 @@ class GraphFit:
 
 
 def fit_session(session: HandRecording, conditions: SessionConditions, trusted: int | None = None) -> GraphFit:
-    """Fit the gyroscope and all attitudes and biases to a session of at least one rest.
+    """Return the fit of the gyroscope, and of all attitudes and biases, to a session of at least one rest.
 
     The variance components are estimated from the first `trusted` rests, by default from all. Raise Fault `no_fit`,
     Refused `first_face_unknown`.

@@ -20,8 +20,8 @@ MAX_RATE_RAD_S = 150.0  # no gyroscope of this kind reads as much: the unit is d
 def check_axes(session: HandRecording) -> None:
     """Raise Fault `wrong_unit`, `mirrored_axis`, `swapped_axes` or `wrong_mounting` if quarter turns show this error.
 
-    If no single map from the accelerometer's axes to the gyroscope's explains all quarter turns, nothing is raised:
-    rests were then missed, so that several moves look like one.
+    If no single map from the accelerometer's axes to the gyroscope's explains all quarter turns, nothing is raised,
+    because rests were then missed, so that several moves look like one.
     """
     if max((move.peak_rad_s for move in session.moves), default=0.0) > MAX_RATE_RAD_S:
         raise Fault("wrong_unit", "the readings look like degrees per second given as rad/s", "Give them in rad/s")

@@ -6,12 +6,12 @@ A factor has rows of equations, with the standard deviation of each cause of the
 Graphs for Robot Perception, 2017).
 
 R is the body's rotation from rest i to rest j, computed from the gyroscope's readings; m̄ and ā are the mean readings
-of gyroscope and accelerometer in a rest, and f is the upward vertical in the body.
+of gyroscope and accelerometer in a rest, and f is the upward vertical in the body. The factors have these residuals:
 
 - move: Log(R (Qᵢᵀ Qⱼ)ᵀ), with the gyroscope's noise and an error in proportion to the angle
 - rest: m̄ − b − G f; walk: the change of the bias from rest to rest, minus the change of a parabolic drift
-- flat: the table's normal in the body equals the face's normal; box: the face's normal equals the nominal one
-- closure: the heading after a whole turn; lean: the mean axis of a turn is the face's normal
+- flat: the table's normal in the body minus the face's normal; box: the face's normal minus the nominal one
+- closure: the change of the heading in a whole turn; lean: the mean axis of a turn minus the face's normal
 - acceleration: ā − F_a Qᵀ g − b_a. The accelerometer serves as a level, so the vertical component has little weight
 """
 

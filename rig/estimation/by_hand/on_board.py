@@ -56,7 +56,7 @@ class BoardMove:
 
 @dataclass(frozen=True, slots=True)
 class BoardSolution:
-    """The solution of the board's equations: `matrix` C and `bias_rad_s` −b, so that rate = matrix (reading + bias).
+    """The solution of the board's equations: `matrix` and `bias_rad_s` of rate = matrix (reading + bias).
 
     `scale_std` is the largest standard uncertainty of the matrix' diagonal elements.
     """

@@ -31,8 +31,9 @@ class SessionProgress:
     - `expanded_scale` (3,): U (k = 2) of the scale factors, from the session and its clock.
     - `faces`, `rests`: face and summary of each rest; `moves`: the summary of each move.
     - `solution`: the solution if the session ended here, None if it is too uncertain.
-    - `fault_of_last`: the fault of the last move or the rest after it; `is_contradiction`: whether it is that the move
-      contradicts those before it, of which one may be wrong too. `missing_faces`: faces without a rest.
+    - `fault_of_last`: the fault of the last move, or of the rest after it.
+    - `is_contradiction`: whether that fault contradicts earlier moves, so that one of these may be wrong instead.
+    - `missing_faces`: faces without a rest.
     """
 
     expanded_scale: Array

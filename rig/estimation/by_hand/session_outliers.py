@@ -1,11 +1,11 @@
 """The search for the rest or move that contradicts the others: outlier tests of a session by hand.
 
-A fault hypothesis is that some factors are wrong: each of their equations gets its own column (Baarda's mean-shift
-model, 1968). The hypothesis with the largest decrease of χ² is reported.
+A fault hypothesis is that some factors are wrong, so each of their equations gets a column of its own (Baarda's
+mean-shift model, 1968). The hypothesis with the largest decrease of χ² is reported.
 
 A single large outlier inflates the hand's standard deviations, which then mask the outlier: the result is right, but
-has a larger U. `find_masked_fault` re-estimates the standard deviations without each candidate. It does not test
-biases, because real biases jump.
+has a larger U. `find_masked_fault` re-estimates the standard deviations without each candidate. Biases are no
+candidates, because real biases jump.
 """
 
 from collections.abc import Iterator, Sequence

@@ -18,7 +18,7 @@ FACES = ("+x", "-x", "+y", "-y", "+z", "-z")
 class HandRest:
     """A rest from `start_s` to `end_s`: mean (3,) of `samples` readings and their standard deviation (3,).
 
-    With an accelerometer, also its mean reading (3,) and standard deviation (3,).
+    `acceleration_m_s2` and `acceleration_noise_m_s2` are the same for an accelerometer's readings, None without one.
     """
 
     start_s: float
@@ -36,7 +36,7 @@ class HandRest:
 
 @dataclass(frozen=True, slots=True)
 class Move:
-    """A move, from inside the rest before it to inside the rest after; `peak_rad_s` is the largest reading.
+    """A move, from a time in the rest before it to a time in the rest after it; `peak_rad_s` is the largest reading.
 
     The rotation is unknown if readings are missing (`lost`), the gyroscope was at the end of its range (`clipped`), or
     the operator withdrew the move (`left_out`).
