@@ -99,9 +99,9 @@ def find_inclinations(averaged: FixedAttitudes, fixes: Fixes, matrix: Array) -> 
 
 
 def _find_moments(fixes: Fixes) -> Array:
-    """Return the sums Σ v vᵀ (N, 9), as flattened (3, 3) matrices, of the rotations that begin at each fix's samples.
+    """Return for each fix the sum Σ v vᵀ (N, 9), a flattened (3, 3) matrix, over the fix's samples.
 
-    v is the rotation vector, in body coordinates, from one sample to the next.
+    v is the rotation vector, in body coordinates, from a sample to the next one.
     """
     turns = rotation_vectors(np.swapaxes(fixes.attitudes[:-1], -1, -2) @ fixes.attitudes[1:])
     turns = np.concatenate([turns, turns[-1:]])

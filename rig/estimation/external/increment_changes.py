@@ -41,9 +41,9 @@ def find_reset(
     """Return time and angle (rad) of the largest lasting rotation of the attitudes' coordinates, or None.
 
     A new origin of the reference rotates all later attitudes, so the rotations of consecutive outliers add up to a
-    lasting one. At a single wrong attitude, the rotations of the increments before and after it cancel. `aside` (N −
-    1,) is a mask of the increments between `fixes` that are outliers. A `change` of the attitudes, found among the
-    other increments, is returned if it is larger.
+    lasting one. At a single wrong attitude, the rotations of the increments before and after it cancel. The mask
+    `aside` shows which increments between `fixes` are outliers. A `change` of the attitudes, found among the other
+    increments, is returned if it is larger.
     """
     turned: tuple[float, float] | None = None
     if change is not None and change.what == "attitude" and np.linalg.norm(change.sizes) > MIN_RESET_RAD:

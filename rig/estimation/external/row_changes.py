@@ -3,8 +3,8 @@
     m_j = F ω_j + c + (h  or  diag(h) F ω_j,  from one row on) + errors of the stated motion + noise
 
 m_j is the mean reading at the stated rate ω_j of a sensor with the matrix F and the offset c; h (3,) is the change of
-the bias, or the relative change of each axis' scale factor. The rows themselves determine how large the errors are of
-the stated rates and axes.
+the bias, or the relative change of each axis' scale factor. The rows themselves determine how large the errors of the
+stated rates and axes are.
 """
 
 from collections.abc import Sequence
