@@ -131,8 +131,8 @@ class Accumulator:
     def _condition(self, translation: Array) -> tuple[int, float, int]:
         """Return rank and condition number of the design after a translation, and its weakest axis (0–2).
 
-        Readings are scaled by their RMS length first: squares and linear terms become comparable, and an axis without
-        signal stays small. The rank counts the singular values above the largest / MAX_CONDITION.
+        Readings are scaled by their RMS length first, so that squares and linear terms become comparable, and an axis
+        without signal stays small. The rank counts the singular values above the largest / MAX_CONDITION.
         """
         normal = translation @ self.geometry @ translation.T
         length = np.sqrt(np.trace(normal[3:6, 3:6]) / self.count)

@@ -1,10 +1,10 @@
 """The second-order effect of mounting errors on scale and bias: a tilt multiplies a rate by the tilt's cosine.
 
-If sweeps do not determine an item's mounting, only the size of the rates' angular errors is known. The first order of
-these errors is a pattern like that of any other error. The mean and the covariance of the second order, 150 ppm for 1°,
-follow from the covariance of the angles (JCGM 100, 5.1.2, note). Every stage of the run, that is, every mounting of
-the item, has its own angles, the first stage too. A rotation common to all stages, which changes no scale, then adds
-nothing.
+If sweeps do not determine an item's mounting, only the size of the rates' angular errors is known. Their first-order
+effect is propagated like that of any other error. The mean and the covariance of the second-order effect, 150 ppm for
+1°, follow from the covariance of the angles (JCGM 100, 5.1.2, note). Every stage of the run, that is, every mounting of
+the item, has angles of its own, including the first stage. So a rotation that all stages have in common, which changes
+no scale, has no effect here either.
 """
 
 import numpy as np

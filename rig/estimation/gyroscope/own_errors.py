@@ -1,7 +1,7 @@
 """A gyroscope's errors outside the vector model, whose likely size the data sheet states.
 
 These are nonlinearity and sensitivity to temperature. Each is an error common to many readings
-(`rig.estimation.gyroscope.common_errors`): the result is corrected for the part that sweeps and rests determine, the
+(`rig.estimation.gyroscope.common_errors`). The result is corrected for the part that sweeps and rests determine; the
 other part is a contributor of the budget.
 """
 

@@ -28,9 +28,11 @@ GRID_POINTS = 20  # for each kind of error
 class StatedMotion:
     """Mean readings of sweeps and rests, and their stated motion.
 
-    `residuals_rad_s` (N, 3): readings minus the model's; `rates_rad_s` (N, 3), zero for a rest; `variances_rad2_s2` (N,
-    3) of the noise of each mean. `rate_patterns` (N, 3): the effects of a relative rate error of 1; `axis_patterns` (2,
-    N, 3): those of axes tilted by 1 rad about either direction across them.
+    - `residuals_rad_s` (N, 3): readings minus those of the model.
+    - `rates_rad_s` (N, 3): the stated rates, zero for a rest.
+    - `variances_rad2_s2` (N, 3): the variances of the means due to noise.
+    - `rate_patterns` (N, 3): the effects on the readings of a relative rate error of 1.
+    - `axis_patterns` (2, N, 3): the effects of axes tilted by 1 rad about either direction across the axis.
     """
 
     residuals_rad_s: Array

@@ -3,7 +3,7 @@
 Gravity is fixed in the room and rotates in the flange's frame, so attitudes separate g-sensitivity from bias; at rest
 the sensor reads only bias, Earth's rate and the effect of gravity. In a sweep the flange circles about the swept axis
 with a centripetal acceleration that the arm's geometry determines. Sweeps about more than three axes separate the
-angles between the sensor's axes from those between the arm's, sweeps at several speeds determine the nonlinearity.
+angles between the sensor's axes from those between the arm's. Sweeps at several speeds determine the nonlinearity.
 Effects that sweeps and rests do not separate are left out of the model and belong to the uncertainty.
 """
 

@@ -105,7 +105,9 @@ def solve_vector_model(
     nominal_mounting: ArrayLike | None = None,
     shared_covariance_rad2_s2: ArrayLike | None = None,
 ) -> VectorSolution:
-    """Return the solution of the vector model, m = F ω + c (+ G a), by weighted least squares.
+    """Return the solution of the vector model by weighted least squares.
+
+    The mean reading is m = F ω + c (+ G a), with the rate ω and the apparent gravity a.
 
     - `means_rad_s`, `variances_rad2_s2` (N, 3): mean readings and the variances of these means.
     - `rates_rad_s` (N, 3): the mean rate in the flange frame, zero for a rest.
@@ -303,10 +305,10 @@ def _all_variances(variances: Array, speed_noise: Array | None, shared: Array | 
 
 
 def _response(to_parameters: Array, inverse: Array) -> Array:
-    """Return the derivative (6, N, 3) of k and b with respect to the mean readings, by the chain rule.
+    """Return the derivative (6, N, 3) of scale and bias with respect to the mean readings, by the chain rule.
 
-    `to_parameters` (6, 12) is the derivative of k and b with respect to the coefficients; `inverse` (3, p, N) maps
-    readings to coefficients.
+    `to_parameters` (6, 12) is the derivative of scale and bias with respect to the coefficients; `inverse` (3, p, N)
+    maps readings to coefficients.
     """
     by_axis = np.concatenate([to_parameters[:, :9].reshape(6, 3, 3), to_parameters[:, 9:, None]], axis=2)
     response: Array = np.matmul(np.swapaxes(by_axis, 0, 1), inverse[:, :4]).transpose(1, 2, 0)
