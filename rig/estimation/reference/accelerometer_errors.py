@@ -4,9 +4,10 @@ The reading r is slightly nonlinear in the specific force v along an axis; scale
 
     r = (1 + κ ΔT) v + φ v² + χ (v³ − g² v) + b + β ΔT + w(t)
 
-φ, χ, β and κ of each axis are zero on average, w is flicker and a random walk. So the scale refers to the readings at 1
-g up and 1 g down, which φ and χ do not change, and b is the reading at 0 g, as in data sheets (ST DS12140, sections
-4.6.1 and 4.6.2). Both refer to the readings' mean temperature; b includes the mean of w over their time.
+g is the norm of gravity, ΔT the temperature minus its mean. φ, χ, β and κ of each axis are zero on average, w is
+flicker and a random walk. So the scale refers to the difference of the readings at 1 g up and 1 g down, which φ and χ
+do not change, and b is the reading at 0 g, as in data sheets (ST DS12140, sections 4.6.1 and 4.6.2). Both refer to the
+readings' mean temperature; b includes the mean of w over their time.
 """
 
 from dataclasses import dataclass, replace

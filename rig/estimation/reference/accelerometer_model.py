@@ -17,8 +17,8 @@ these weighted ω² and α. In uneven rotation, ω² and α are those of the tim
 further (ω − ω₀) τ, with the mean rate ω₀.
 
 ψ = ω τ is the joint's rotation during the lag τ of the accelerometer behind the clock of its time stamps; its sign is
-that of ω. If a gyroscope's readings have set that clock, τ is the lag behind the gyroscope. The filter's attenuation,
-(ω τ)²/2 at most, is neglected: 14 ppm at 60°/s and 5 ms.
+that of ω. If a gyroscope's readings have set that clock, τ is the lag behind the gyroscope. The filter's attenuation is
+neglected; it is at most (ω τ)²/2, which is 14 ppm at 60°/s and 5 ms.
 
 Dwells and sweeps form one list of K = N + 3 M vectors: the N dwells, then mean, cosine and sine of each of M sweeps. θ
 (22,) contains F row by row, v_ref, b, r, τ and φ.
@@ -256,9 +256,9 @@ def jacobian(theta: Array, movement: Movement) -> Array:
 
 
 def effects(theta: Array, movement: Movement) -> Array:
-    """Return the effect (3 K, P) of each of the arm's errors on the readings, per radian; P = 3 N + 10 per station.
+    """Return the effect (3 K, P) of each of the arm's errors on the readings, per radian.
 
-    Each dwell has three errors. The sweeps of a station share ten: small rotations of flange and base, and the
+    Each dwell has three errors. The sweeps of a station share ten errors: small rotations of flange and base, and the
     joint's angle error A cos θ + B sin θ + C cos 2θ + D sin 2θ. The wrists' constant errors (`Movement.arm_turns`), if
     known, come last and are common to all stations.
     """
@@ -301,9 +301,10 @@ def arm_effects(theta: Array, movement: Movement) -> Array:
 def _differentiate_angle(apparent: Array, theta: Array, sweeps: Sweeps) -> Array:
     """Return the harmonics (3 M, 3, 4) of the specific force due to angle errors w: cos θ, sin θ, cos 2θ, sin 2θ.
 
-    Gravity `apparent` changes by w times the derivative of its first harmonic. The rate grows by ω w′, so the first two
-    errors also add the first harmonics of the centripetal acceleration 2 ω² w′ (a aᵀ − I) (p + r) and the Euler
-    acceleration ω² w″ a × (p + r). The effect of the delay on these is neglected.
+    With the joint's axis a, its rate ω and the lever arm p + r: gravity `apparent` changes by w times the derivative of
+    its first harmonic. The rate grows by ω w′, so the first two errors also add the first harmonics of the centripetal
+    acceleration 2 ω² w′ (a aᵀ − I) (p + r) and the Euler acceleration ω² w″ a × (p + r). The effect of the delay on
+    these is neglected.
     """
     axes, arms, squares = sweeps.axes_flange, sweeps.arms_m + theta[LEVER], sweeps.speeds_rad_s[:, None] ** 2
     _, cos, sin = np.moveaxis(apparent.reshape(-1, 3, 3), 1, 0)

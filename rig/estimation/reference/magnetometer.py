@@ -96,7 +96,8 @@ class FieldDrift:
 def field_drift(means_t: ArrayLike, variances_t2: ArrayLike, repeatability_rad: float) -> FieldDrift:
     """Return the most significant change of readings (N, 3), N ≥ 2, in one attitude since the first of them.
 
-    `variances_t2` (N, 3); attitudes repeat with a standard deviation of `repeatability_rad` about each axis.
+    `variances_t2` (N, 3) are those of the means. The attitude repeats with a standard deviation of `repeatability_rad`
+    about each axis.
     """
     from scipy.special import chdtri
 

@@ -26,8 +26,8 @@ MOUNTING_TOLERANCE = 1e-6  # mountings are nominal and exact
 class Reversal:
     """The bias (3,) in the sensor's axes, the arm's field (3,) in the first run's axes, and their covariance (6, 6).
 
-    If an axis was not turned over, its `arm_field_in_bias` is True: its bias contains the sum of both, its field is 0.
-    The runs agree if `chi_square` is at most `limit`.
+    If an axis was not turned over, its `arm_field_in_bias` is True. The axis' bias is then the sum of bias and field,
+    and the axis' field is 0. The runs agree if `chi_square` is at most `limit`.
     """
 
     bias_t: Array

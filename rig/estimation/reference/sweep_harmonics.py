@@ -242,10 +242,10 @@ def _motion_terms(uneven: _Unevenness, turn: JointTurn) -> Array:
 def _list_vibration(uneven: _Unevenness, angle_rad: Array, mean_speed_rad_s: float) -> Array:
     """Return the specific force (n, 6) of the joint's vibration, with derivatives for the filter's lag.
 
-    At the rate ω, with the mean ω₀, the centripetal acceleration has the linear part 2 ω₀ (ω − ω₀). It represents the
-    whole, without the square (ω − ω₀)². This square has a mean, which the columns of a vibration at one frequency could
-    imitate, so that the regression would remove it from the mean of the readings. The model accounts for the square
-    instead, by `FirstHarmonic.turning_rad2_s2`.
+    ω is the joint's rate and ω₀ its mean. Of the centripetal acceleration only the linear part, 2 ω₀ (ω − ω₀), is
+    returned, without the square (ω − ω₀)². This square has a mean, which the columns of a vibration at one frequency
+    could imitate, so that the regression would remove it from the mean of the readings. The model accounts for the
+    square instead, by `FirstHarmonic.turning_rad2_s2`.
     """
     rate, *derivatives = uneven.fast
     return np.column_stack([rate, *derivatives, rate * np.cos(angle_rad), rate * np.sin(angle_rad)])

@@ -6,12 +6,12 @@ R maps body coordinates to table coordinates; v_ref, in table coordinates, is es
 motion: for a gyroscope its rate (v_ref is then the Earth's rate), zero for an accelerometer or a magnetometer. With v̄
 = 0 the factor between F and v_ref is unknown, so ‖v_ref‖ and its half-space must be given.
 
-Three methods: "as_published" solves the stacked equations (`rig.estimation.reference.stacked`). The readings are in X,
-so their noise σ shrinks F⁻¹ by about (σ/v_rms)², regardless of their number (errors in variables). This is significant
-if √N σ/v_rms nears one: not for averages of minutes, but for single samples at slow rates. "maximum_likelihood"
-continues with weighted least squares in the readings themselves (`rig.estimation.reference.reference_model`): it is
-unbiased, independent of the scaling of columns, and efficient. "attitude_weighted" also estimates attitude errors, such
-as those of an arm (`rig.estimation.reference.attitude_error`).
+There are three methods. "as_published" solves the stacked equations (`rig.estimation.reference.stacked`). Their design
+contains the readings, so the readings' noise σ shrinks F⁻¹ by about (σ/v_rms)², regardless of their number N
+(errors in variables). This is significant if √N σ/v_rms nears one: not for averages of minutes, but for single samples
+at slow rates. "maximum_likelihood" continues with weighted least squares in the readings themselves
+(`rig.estimation.reference.reference_model`), which is unbiased, independent of the scaling of columns, and efficient.
+"attitude_weighted" also estimates attitude errors, such as those of an arm (`rig.estimation.reference.attitude_error`).
 """
 
 from collections.abc import Callable
