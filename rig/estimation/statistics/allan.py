@@ -117,7 +117,7 @@ def too_short(what: str, enough_s: float = MIN_DURATION_S) -> Fault:
 
 
 def equivalent_dof(points: int, factor: int, noise: Noise) -> float:
-    """Return the equivalent dof (at least 1) of an Allan variance over `factor` readings each.
+    """Return the equivalent dof (at least 1) of the Allan variance of means of `factor` readings.
 
     `points` is the number of phases, one more than that of all readings.
     """
@@ -133,7 +133,7 @@ def equivalent_dof(points: int, factor: int, noise: Noise) -> float:
 
 
 def _average_squares(phases: Sequence[Array], factor: int) -> Array:
-    """Return the Allan variance (3,) over `factor` readings, from all intervals that are long enough."""
+    """Return the Allan variance (3,) of means of `factor` readings, from all intervals that are long enough."""
     total, count = np.zeros(3), 0
     for phase in phases:
         if len(phase) > 2 * factor:

@@ -16,12 +16,13 @@ TOLERANCE = 1e-2  # unit columns whose difference is smaller are collinear
 
 
 def mean_weights(groups: Array, nuisance: Array) -> Array:
-    """Return the weights (p, n) of the means of p groups of n samples that are free of nuisance columns.
+    """Return the weights (p, n) of the means of p groups of samples, with which the means of nuisance columns are zero.
 
-    groups (n, p): one if a sample belongs to a group, zero otherwise; a sample belongs to at most one. nuisance (n, k):
-    the columns. Parts that are collinear with groups or other columns are not removed. Among all such weights, these
-    have the least sum of squares, which is the variance of a mean of white noise of variance one. A group without
-    samples has no weights.
+    - groups (n, p): one if a sample belongs to a group, zero otherwise; a sample belongs to at most one group.
+    - nuisance (n, k): the columns. Parts that are collinear with groups or other columns are not removed.
+
+    Among all such weights, these have the least sum of squares, which is the variance of a mean of white noise of
+    variance one. The weights of a group without samples are zero.
     """
     averages = groups.T / np.maximum(groups.sum(axis=0), 1.0)[:, None]
     if not nuisance.shape[1]:

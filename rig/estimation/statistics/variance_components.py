@@ -4,8 +4,8 @@
 
 The standard deviations σ_k have the likelihood of y with θ integrated out (Patterson and Thompson, Biometrika 58 (1971)
 545; Harville, J. Am. Stat. Assoc. 72 (1977) 320) and half-Cauchy priors (Gelman, Bayesian Analysis 1 (2006) 515). A few
-residuals hardly determine them, so the uncertainty of θ is integrated over all σ_k, weighted by their posterior: by
-adaptive importance sampling (JCGM 101, 6.4.9).
+residuals hardly determine them, so the uncertainty of θ is integrated over all σ_k, weighted by their posterior. This
+is done by adaptive importance sampling (JCGM 101, 6.4.9).
 """
 
 from collections.abc import Callable, Sequence
@@ -46,7 +46,7 @@ class Mixed:
     - `fixed` (m, m): the known part of the errors' covariance; `components` (k, m, m): the covariance for each of k
       causes of errors with the standard deviation 1.
     - `scales` (k,): the medians of the half-Cauchy priors of the causes' standard deviations.
-    - `alone` (k, 2): sum of squares and dof of each cause's residuals, measured separately from y; 0 if not measured.
+    - `alone` (k, 2): sum of squares and dof of each cause's errors in a separate measurement; 0 if not measured.
     """
 
     observed: Array
@@ -194,8 +194,8 @@ class MixedModel:
     def expand(self, maxima: Array, wanted: Array) -> Array:
         """Return the half-widths (q,) of the 95.45 % intervals of combinations `wanted` (q, p) of the coefficients.
 
-        The intervals are about the estimates at the first of `maxima` (n, k), and integrate over all standard
-        deviations.
+        The intervals are centred on the estimates at the first of `maxima` (n, k). They contain 95.45 % of the
+        distribution averaged over all standard deviations.
         """
         top = wanted @ self.solve(maxima[0]).theta
         offsets = []
@@ -346,9 +346,9 @@ def _temper(weights: Array, fewest: float) -> Array:
 
 
 def find_half_width(offsets: Array, variances: Array, weights: Array) -> Array:
-    """Return h (q,): 95.45 % of a mixture of normal distributions lie from −h to h.
+    """Return the half-widths h (q,): 95.45 % of each of q mixtures of normal distributions lie between −h and h.
 
-    The s distributions of each of q values have means `offsets` and `variances` (s, q), with weights (s,).
+    The s distributions of a mixture have means `offsets` and `variances` (s, q), with weights (s,).
     """
     from scipy.special import ndtr
 
