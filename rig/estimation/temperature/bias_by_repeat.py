@@ -1,7 +1,7 @@
 """The bias in every repeat of the same attitudes, and its steps between repeats: Figs. 4 and 6 of the paper TRIAX.
 
-Scale, axes and reference are fixed: their errors, and those of the arm's attitudes, are the same in every repeat of an
-attitude and cancel in the differences between repeats.
+Scale, axes and reference are fixed, because their errors, and those of the arm's attitudes, are the same in every
+repeat of an attitude and cancel in the differences between repeats.
 
 The bias stepped before a repeat if the means before and from this repeat differ significantly. A steady bias seems to
 step in at most 2 % of runs, over all repeats and axes together (Bonferroni's inequality). The repeats before a step and
@@ -38,7 +38,8 @@ class BiasStep:
 class BiasByRepeat:
     """The bias of every repeat.
 
-    - `bias` (R, 3); `std` (R, 3): standard deviation of its differences; `moves`: the steps of the bias.
+    - `bias` (R, 3); `std` (R, 3): the biases' standard deviations in differences between repeats; `moves`: the steps of
+      the bias.
     - `excess` (3,): the ratio of the scatter of means in an attitude to their standard deviation, at least 1 (Birge
       ratio). It is due to inexact repeats of attitudes, or to bias drift within a repeat, and is included in `std`.
     - `dof` (3,): degrees of freedom of the excess if there is one, else infinite.

@@ -8,7 +8,7 @@ plan. Only the changes from repeat to repeat depend on temperature:
 x is the input, F the matrix at the reference temperature, and T − reference is the variable of the polynomials q and c,
 which have no constant. The order of q and the order of c, each common to all axes, minimise AICc (Hurvich and Tsai,
 Biometrika 76 (1989) 297). The results of the other orders, with their Akaike weights (Burnham and Anderson, Model
-Selection, 2002, 4.3), contribute to the uncertainty. The hysteresis, the difference of warming and cooling, closes at
+Selection, 2002, 4.3), contribute to the uncertainty. The hysteresis, the difference of warming and cooling, is zero at
 both ends of the range. The thermometer's lag is fitted too.
 """
 
@@ -118,8 +118,8 @@ def _gradient(polynomials: OverTemperature, half_width_k: float) -> TemperatureL
     """Return the contributor of the temperature difference between sensor and thermometer.
 
     A difference changes each value in proportion to its polynomial's slope. One part of the difference is the same over
-    the range; an independent part has opposite signs at the range's ends, because a heater's power and the loss to the
-    air grow with temperature.
+    the range. Another part, independent of the first, changes its sign from one end of the range to the other, because
+    a heater's power and the loss to the air grow with temperature.
     """
     both = np.array([polynomials.scale, polynomials.bias])
     steep = np.arange(1, MAX_ORDER + 1)[:, None] * both[:, 1:]
