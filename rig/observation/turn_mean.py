@@ -46,7 +46,8 @@ class SampledTurn:
 
     - `fraction` (n,): elapsed fraction of the turn's time.
     - `rates_rad_s` (n, 3): the flange's mean rate around each sample, from the encoders.
-    - `uneven_rad_s` (n,): that rate along the axis minus the turn's mean rate, which the angles at its ends determine.
+    - `uneven_rad_s` (n,): that rate along the axis minus the mean rate, which follows from the angles at the turn's
+      ends.
     - `regressors` (n, k): columns of the turn's harmonics; for an arc, their means are subtracted.
     - `sidebands`: number of sidebands of spectral lines, see `Revolution`.
     - `encoders_true`: whether the encoders are right within a turn, not only over whole turns.

@@ -211,7 +211,7 @@ def _free_disturbed_transfers(
 def _inflate_transfers(
     segments_only: _TestedSegments, matrix: Array, allowance: ErrorPatterns, bias: BiasProcess, disturbed: Sequence[int]
 ) -> _TestedSegments:
-    """Return `_whiten_with_transfers` with the transfers' variance inflated until their χ² is at most its dof.
+    """Return the result of `_whiten_with_transfers`, with the transfers' variance inflated until χ² is at most its dof.
 
     The transfers' χ² and dof are those of segments with transfers minus those of segments alone. The factor on their
     unexplained variance is at most `MAX_RIPPLE_INFLATION`.

@@ -36,7 +36,7 @@ def prediction_variance(directions: ArrayLike, points: ArrayLike, model: Model =
 def maximum_prediction_variance(directions: ArrayLike, model: Model = "squared") -> float:
     """Return the largest `prediction_variance` on the unit sphere: the G-criterion, at least `PARAMETER_COUNT[model]`.
 
-    The variance is a smooth quartic: a local search from the best point of a fine grid finds its maximum.
+    The variance is a smooth quartic, so a local search from the best point of a fine grid finds its maximum.
     """
     from scipy.optimize import minimize
 

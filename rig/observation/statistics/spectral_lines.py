@@ -73,11 +73,11 @@ def find_lines(residuals: Array, search: LineSearch, previous: Array = EMPTY, fr
 
 
 def _are_too_near(cycles: Array, search: LineSearch) -> bool:
-    """Return whether two spectral lines cannot be told apart, or the slowest one cannot from the turn's harmonics.
+    """Return whether two spectral lines, or the slowest line and the turn's harmonics, cannot be told apart.
 
-    A line that is refined to below the search's lowest frequency is valid only if its sidebands do not overlap those of
-    another line. Otherwise a vibration and a ripple whose frequencies differ by less than a cycle would together
-    explain a part of the mean.
+    The refinement may move a line below the lowest frequency of the search. It is then valid only if its sidebands do
+    not overlap those of another line. Otherwise a vibration and a ripple whose frequencies differ by less than a cycle
+    would together explain a part of the mean.
     """
     ordered = np.sort(cycles)
     gaps = np.diff(ordered)
