@@ -57,7 +57,7 @@ def add_attitude(average: Average, motion: ArmMotion) -> Average:
 
 
 def estimate_bias_drift(rests: Sequence[Average]) -> Array:
-    """Return the part (3,) of the variance of the rests' means, (rad/s)², that the noise does not explain: bias drift.
+    """Return the variance (3,) of the rests' means due to bias drift, (rad/s)², which the noise does not explain.
 
     The result is zero unless χ² over all axes is significant at 0.999, so that noise does not count as drift.
     """

@@ -132,8 +132,8 @@ def observe_runs(runs: Sequence[RunData], corrections: Mapping[int, Array] = NO_
 def _clock_offsets_s(recordings: Sequence[ObservedRun]) -> list[float]:
     """Return the offset of each recording's clock to the first one's; the controller may restart in between.
 
-    A recording begins after the previous one has ended, even if the computer's clock disagrees: that clock may have
-    been set, or the arm may be simulated faster than real time.
+    A recording begins after the previous one has ended, even if the computer's clock disagrees, because that clock may
+    have been set, or the arm may be simulated faster than real time.
     """
     offsets_s = [0.0] * bool(recordings)
     for last, recording in pairwise(recordings):

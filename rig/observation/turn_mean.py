@@ -71,9 +71,9 @@ class Lines:
 
     - `encoded` (n, m): columns to remove from the residuals: a slow ripple that the encoders measure, its changes, and
       the remainder of the encoders' rate, mostly noise.
-    - `rate` (n, 0 to 2): columns that the weights cancel in addition to the lines. If few samples or a gap sample the
-      ripple unevenly, the column is the rate itself. Otherwise, for whole turns, the columns are the changes of the
-      slow ripple, of which a lagging sensor reads a small part.
+    - `rate` (n, 0 to 2): columns that the weights cancel in addition to the lines. If the ripple is sampled unevenly,
+      because samples are few or there is a gap, the column is the rate itself. Otherwise, for whole turns, the columns
+      are the changes of the slow ripple, of which a lagging sensor reads a small part.
     """
 
     cycles: Array

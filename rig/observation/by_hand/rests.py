@@ -77,8 +77,8 @@ def find_rests(
 def _average_unknocked(blocks: Array, noise: Array) -> tuple[Array, Array]:
     """Return means and scatter (count, 3) of blocks (count, width, 3), each without the few readings of a knock.
 
-    A knock is a disturbance with equal readings before and after. This is not for a gyroscope's readings, because a
-    knock may turn the body.
+    A knock is a disturbance with equal readings before and after. The function must not be used for a gyroscope's
+    readings, because a knock may turn the body.
     """
     before, after = np.concatenate([blocks[:1, 0], blocks[:-1, -1]]), np.concatenate([blocks[1:, 0], blocks[-1:, -1]])
     extended = np.concatenate([before[:, None], blocks, after[:, None]], axis=1)

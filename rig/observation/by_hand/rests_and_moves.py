@@ -58,9 +58,10 @@ def range_of(sensor: RecordedSensor) -> float | None:
 class NotCounted:
     """The parts of a session that are left out, in the session's seconds.
 
-    `moves` and `rests`: the intervals of refused moves and rests; `seams`: the middles of the gaps between recordings;
-    `from_s`: the time before which everything is left out. Recorded events state times in microseconds of the sensor's
-    clock, each of which truly lasts `microsecond_s` seconds.
+    - `moves`, `rests`: the intervals of refused moves and rests.
+    - `seams`: the middles of the gaps between recordings.
+    - `from_s`: the time before which everything is left out.
+    - `microsecond_s`: the true duration, s, of a microsecond of the sensor's clock, in which events state times.
     """
 
     moves: list[tuple[float, float]] = field(default_factory=list)
@@ -154,8 +155,8 @@ def session_of(runs: Sequence[RunData], name: str) -> HandRecording:
 def collect_inputs(settings: RunSettings, provenance: Provenance, sensor: RecordedSensor) -> SessionConditions:
     """Return the inputs of a session's solution other than a sensor's readings.
 
-    One input is the face that is up at first: None if an accelerometer shows it, otherwise the face requested first.
-    Raise Refused `clock_unknown` if the error of the clock that stamps the readings is not stated.
+    One input is the face that is up at first. It is None if an accelerometer shows it, otherwise the face that was
+    requested first. Raise Refused `clock_unknown` if the error of the clock that stamps the readings is not stated.
     """
     by_hand, uncertainty = settings.by_hand, settings.uncertainty
     if by_hand is None or uncertainty is None or (sensor.on_board and not provenance.board_follows_crystal):

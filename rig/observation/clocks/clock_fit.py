@@ -70,8 +70,8 @@ def _is_contradiction(clock: TimeBase, refined: TimeBase) -> bool:
     """Return whether a finer fit has a less certain drift than the fit before it, and contradicts that fit.
 
     The finer fit has then found another optimum, because readings without a filter show fast ripples at other
-    frequencies (aliasing). Only the drifts are compared: filters delay slow and fast parts differently, so the offsets
-    may differ.
+    frequencies (aliasing). Only the drifts are compared. The offsets may differ, because filters delay slow and fast
+    parts differently.
     """
     difference, std = abs(refined.drift - clock.drift), float(np.hypot(refined.drift_std, clock.drift_std))
     return refined.drift_std > clock.drift_std and difference > MAX_DRIFT_DIFFERENCE * std

@@ -73,7 +73,7 @@ def find_encoder_noise_rad(recordings: Sequence[ObservedRun]) -> float:
     """Return the noise of one reading of a joint's angle, rad, from the joints that are at rest during a sweep.
 
     The noise is the scatter of sixth differences, as in `state_jitter`, and includes the encoders' steps. Return zero
-    if the noise is unknown: for a turner with a single shaft, which never rests in a sweep, or with inaccurate angles.
+    if the noise is unknown, because the turner has a single shaft, which never rests in a sweep, or inaccurate angles.
     """
     squares = [
         np.mean(np.delete(steps_rad, sweep.joint, axis=1) ** 2)

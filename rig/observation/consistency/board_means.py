@@ -50,8 +50,8 @@ def _deviation(recording: ObservedRun, stream: Stream, turn: Observation, observ
     random phases, have on the board's average.
 
     The computer's mean predicts the board's average, after two corrections for the board's different window and
-    weights. The reading due to the rotation, mean minus zero, is scaled to the arm's mean rate in the board's window;
-    the average of the spectral lines in that window is added.
+    weights. The reading due to the rotation, which is the mean minus the reading at zero rate, is scaled to the arm's
+    mean rate in the board's window. The average of the spectral lines in that window is added.
     """
     zero, average, board = stream.clock.zero_rate_rad_s, turn.average, observed.observation
     axis = turn.axis_flange

@@ -40,10 +40,10 @@ def counts_of(stream: Stream, quantity: Quantity, inside: slice) -> NDArray[np.i
 
 
 def innovation_std(counts: NDArray[np.int64]) -> Array:
-    """Return the standard deviation (3,), in counts, of the noise of a reading: the error of its prediction.
+    """Return the standard deviation (3,), in counts, of the noise of a reading.
 
-    A reading is predicted from previous readings, which excludes drift and vibration, because these shift neighbouring
-    readings together.
+    The noise is the error of predicting a reading from previous ones. This excludes drift and vibration, because they
+    shift neighbouring readings together.
     """
     return np.array([_innovation_std(axis - axis.mean()) for axis in counts.T])
 

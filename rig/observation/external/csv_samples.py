@@ -1,8 +1,9 @@
 """An external file of samples: a column for each axis of each quantity, in SI units.
 
-Columns: `time_s`, and any of `x_rad_s y_rad_s z_rad_s` (rate), `x_m_s2 y_m_s2 z_m_s2` (specific force: at rest the
-opposite of gravity) and `x_t y_t z_t` (magnetic field, tesla). `temperature_c` serves a calibration over temperature.
-Columns may have any order; the first row holds their names. Each command uses the quantities that it needs.
+The columns are `time_s`, and any of `x_rad_s y_rad_s z_rad_s` (rate), `x_m_s2 y_m_s2 z_m_s2` (specific force, which at
+rest is the opposite of gravity) and `x_t y_t z_t` (magnetic field, tesla). `temperature_c` serves a calibration over
+temperature. Columns may have any order; the first row holds their names. Each command uses the quantities that it
+needs.
 
 Loggers of several sensors leave cells blank in rows of another sensor. Such rows are left out, and counted.
 """

@@ -88,10 +88,10 @@ def _suitable_s(span_s: float) -> float:
 
 
 def _fixes(turning: Turning, still: NDArray[np.bool_], window_s: float) -> Fixes:
-    """Group the reference's attitudes into fixes, without regard to the gyroscope's gaps.
+    """Return the reference's attitudes, grouped into fixes without regard to the gyroscope's gaps.
 
-    Rows of the reference that are `still` are rests: each gives a fix at its start and one at its end, and these two
-    have the same `placement`. The other rows give one fix for each window of `window_s` between two rests.
+    Rows of the reference that are `still` are rests. Each rest gives a fix at its start and one at its end, and these
+    two have the same `placement`. The other rows give one fix for each window of `window_s` between two rests.
     """
     rows_s = turning.rows_s
     passed = np.cumsum(still)
@@ -150,10 +150,10 @@ def _drop_thin(fixes: Fixes) -> Fixes:
 def _find_joined(
     turning: Turning, fixes: Fixes, clock_s: float
 ) -> tuple[NDArray[np.bool_], Array, tuple[OmittedIncrements, ...]]:
-    """Return for each increment whether it is used and the std of its hidden rotation; return the omitted increments.
+    """Return a mask of the increments to use, the std of each increment's hidden rotation, and the omitted increments.
 
-    The mask and the stds, rad, have shape (N − 1,) for N fixes. An increment is not used if it contains a step, from
-    one reading to the next, that may hide too much rotation.
+    Mask and std, rad, have the shape (N − 1,) for N fixes. An increment is not used if it contains a step, from one
+    reading to the next, that may hide too much rotation.
     """
     count = len(fixes.placement)
     first_s = clock_s + fixes.at_s[np.searchsorted(fixes.fix, np.arange(count))]

@@ -3,8 +3,8 @@
 A placement is a rest of the recording (`rig.observation.by_hand.rests`) that contains rows of a reference. Consecutive
 rows without a movement in between are one placement. Rests without a row still show the norm of gravity or the field.
 
-A knock or a gap does not end a placement if the readings before and after are equal: the body then lay still, and only
-the readings in between are left out.
+A knock or a gap does not end a placement if the readings before and after are equal, because the body then lay still.
+Only the readings in between are left out.
 """
 
 from collections.abc import Mapping, Sequence

@@ -45,10 +45,10 @@ class Revolution:
 
     @property
     def sidebands(self) -> int:
-        """The number of sidebands on either side of a spectral line: the highest harmonic of a turn in the speed.
+        """The number of sidebands on either side of a spectral line: as many as the speed has harmonics of a turn.
 
-        A bad encoder errs, and so makes the shaft's speed vary, once and twice per turn. The readings contain products
-        of two such waves, so twice as many harmonics are fitted to them.
+        A bad encoder errs, and so makes the shaft's speed vary, once and twice per turn. The readings also contain
+        products of two such waves, so twice as many harmonics of a turn are fitted to them.
         """
         return 2 if self.uneven else SIDEBANDS
 
@@ -140,7 +140,7 @@ def _find_ends(time_s: Array, travelled: Array, first: int, last: int, turn_rad:
     """Return the start and end of the revolution, and the standard deviation of the time between, s.
 
     The angle is interpolated between two neighbouring states. If states are missing there, the joint may have been
-    accelerating, so the straight line through the whole revolution gives the time instead; the error is the ripple.
+    accelerating. Then the straight line through the whole revolution gives the time, with the ripple as its error.
     """
     t, angle = time_s[first : last + 1], travelled[first : last + 1]
     speed, offset = np.polyfit(t - t[0], angle, 1)

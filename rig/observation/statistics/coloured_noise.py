@@ -69,7 +69,7 @@ def _spectrum_dof(centred: Array, memory: int) -> float:
 
 
 def _autoregression(products: Array, count: int, memory: int) -> tuple[float, float, int]:
-    """Return Akaike's criterion, the spectrum at zero, and `memory`, the order, from `_products` of `count` residuals.
+    """Return Akaike's criterion, the spectrum at zero and the order `memory`, from `_products` of `count` residuals.
 
     Residuals that only repeat, such as coarse readings, are predicted without error, and their spectrum would be 0 / 0.
     The criterion is then infinite, so that this order is not chosen.
@@ -92,9 +92,10 @@ def _products(residuals: Array, memory: int) -> Array:
 
 
 def _predict(products: Array) -> tuple[Array, float]:
-    """Return the best linear prediction of residuals from the k previous ones, computed from their `_products`.
+    """Return the coefficients (k,) of the best linear prediction of residuals from the k previous ones.
 
-    Return the coefficients (k,), and the sum of squares of the prediction errors, the innovations.
+    Return also the sum of squares of the prediction errors, the innovations. Both follow from the `products` of
+    residuals (`_products`).
     """
     before, now = products[:-1, :-1], products[:-1, -1]
     coefficients = np.asarray(np.linalg.lstsq(before, now, rcond=None)[0], dtype=np.float64)

@@ -152,8 +152,9 @@ def mean_at_rest(readings: Array, time_s: Array, window: Window, steps: Steps) -
     """Return the mean of readings (n, 3) with resolution `steps`, at times (n,), and the window that it represents.
 
     If the arm vibrates, weights are tapered (`average_tapered`), because 2 mg at 14 Hz leave 10 µg in an unweighted
-    mean of three seconds. The window then reaches from half-way up the first flank to half-way down the last: over it
-    an unweighted mean would have the same variance due to a random walk of the bias, within a thousandth.
+    mean of three seconds. The window then reaches from half-way up the first flank to half-way down the last, because
+    an unweighted mean over this window would have the same variance due to a random walk of the bias, within a
+    thousandth.
     """
     if vibrates(readings):
         half_s = flank_s(window.end_s - window.start_s) / 2

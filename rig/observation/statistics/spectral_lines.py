@@ -34,7 +34,7 @@ class LineSearch:
     """The criteria of a spectral line.
 
     - `stands_out`: the line's power exceeds this multiple of the median power around it, and of `floor`.
-    - `floor`: the median power of the readings if lines are sought in quieter data, the encoders' rates; else 0.
+    - `floor`: the median power of the readings if lines are sought in quieter data, such as encoder rates; else 0.
     - `slowest`: the least number of cycles in all readings; `sidebands`: the number of a line's sidebands (`waves`).
     - `most`: the largest number of lines, previous ones included.
     """
@@ -100,8 +100,9 @@ def waves(cycles: Array, fraction: Array, sidebands: int = SIDEBANDS) -> Array:
     """Return cosine and sine columns (n, w k) of k lines at elapsed fractions (n,) of the time, w = `column_count`.
 
     A line also has two linearly growing columns, for a vibration that begins or ends, and sidebands up to `sidebands`
-    cycles above and below it: a rotating sensor measures a vibration of the room at one cycle per turn above and below
-    the vibration's own frequency. For further sidebands see `rig.observation.motion.revolution.Revolution`.
+    cycles above and below it. One sideband on either side is needed because a rotating sensor measures a vibration of
+    the room one cycle per turn above and below the vibration's own frequency. For further sidebands see
+    `rig.observation.motion.revolution.Revolution`.
     """
     line, turn = (_rotate(2 * np.pi * np.outer(number, fraction)) for number in (cycles, range(1, sidebands + 1)))
     shifted = [line * shift for once in turn for shift in (once.conj(), once)]
@@ -129,7 +130,7 @@ def harmonics(angle_rad: Array, most: int) -> Array:
 def unit_columns(columns: Array) -> Array:
     """Return columns (n, k), of any units, scaled to unit length; columns of mere rounding errors become zero.
 
-    Scaled up, rounding errors, which differ between processors, would look like real columns.
+    Otherwise rounding errors, which differ between processors, would be scaled up and look like real columns.
     """
     sizes = np.linalg.norm(columns, axis=0)
     return columns / np.where(sizes > ROUNDING_RATIO * sizes.max(initial=0.0), sizes, np.inf)

@@ -49,8 +49,9 @@ def find_spikes(time_s: Array, rates: Array) -> NDArray[np.intp]:
 def find_markers(rates: Array) -> NDArray[np.intp]:
     """Return the indices (k,) of rates (n, 3) that repeat one value of an axis far more often than those near it.
 
-    So does a logger that writes 0 for a missing value. A sensor with coarse steps repeats its values evenly, and one
-    that is stuck, or at the end of its range, repeats them one after the other.
+    Such rates come from a logger that writes 0, for example, for a missing value. Other causes are excluded: a sensor
+    with coarse steps repeats its values evenly, and a sensor that is stuck, or at the end of its range, repeats them
+    one after the other.
     """
     marked = np.zeros(len(rates), dtype=np.bool_)
     for axis in rates.T if len(rates) else ():
