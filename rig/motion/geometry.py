@@ -243,7 +243,7 @@ def flange_rate(q_rad: ArrayLike, qd_rad_s: ArrayLike, arm: DenavitHartenberg = 
 def flange_rate_by_joint(
     angles_rad: Sequence[Array | float], speeds_rad_s: Sequence[Array | float], arm: DenavitHartenberg
 ) -> Array:
-    """Return angular velocities (…, 3) as `flange_rate` does, from each joint's angles (…) and speeds, or single ones.
+    """Return angular velocities (…, 3) as `flange_rate` does, from arrays or single numbers for each joint.
 
     The rate is propagated from link to link in the links' own frames, which is fast for many states, and faster for
     joints that stand still.

@@ -1,9 +1,13 @@
 """The checks of a gyroscope's recording against itself: segments of sweeps and rests against one model.
 
-One calibration must explain all segments within noise, bias random walk and the known errors of arm and sensor: m =
-F ω + c + G a + d t, the vector model with gravity a and a steady bias drift d. Each check tests the columns of one
-fault, whose χ² without the fault has as many degrees of freedom as there are columns. The bias process is estimated
-from residuals within sweeps and between rests, so that a disturbed sweep does not mask itself.
+One calibration must explain all segments within noise, bias random walk and the known errors of arm and sensor. It is
+the vector model with gravity a and a steady bias drift d:
+
+    m = F ω + c + G a + d t
+
+Each check tests the columns of one fault. Without the fault, the χ² that the columns explain has as many degrees of
+freedom as there are columns. The bias process is estimated from residuals within sweeps and between rests, so that a
+disturbed sweep does not mask itself.
 
 A ripple faster than readings and states affects the transfers' mean readings but no rates, and looks like noise unless
 it is synchronous with the samples. So the unexplained variance of transfers is inflated by their Birge ratio, after a
@@ -150,8 +154,8 @@ def check_gyroscope(
 def _steady_rates(segments: Segments, matrix: Array) -> Segments:
     """Return the segments with the mean rate of each sweep, and with the deviations from it removed from the readings.
 
-    The tested columns contain the rates. With the rates of single segments, they would contain encoder noise, which the
-    residuals have too, and would explain it.
+    The tested columns contain the rates. With the rates of single segments, they would contain the same encoder noise
+    as the residuals, and would explain this part of the residuals.
     """
     rates = segments.rates_rad_s.copy()
     for sweep in distinct(segments.sweep[segments.sweep > REST]):
@@ -304,9 +308,9 @@ def _test_bias_jump(
 ) -> Statistic | None:
     """Return the χ² of the largest bias jump between two rests, beyond drift; None with fewer than three rests.
 
-    The drift is re-estimated with the best jump in the model, because it would contain the jump otherwise. Few rests
-    determine the drift poorly, so the critical value is from F with one degree of freedom per possible jump. Simulated
-    random walks exceed this value about as often as the false-alarm probability states.
+    The drift is re-estimated with the best jump in the model, because otherwise the drift would contain the jump. Few
+    rests determine the drift poorly, so the critical value is from the F distribution, with one degree of freedom per
+    possible jump. Simulated random walks exceed this value about as often as the false-alarm probability states.
     """
     steady_columns, steps = _steady_columns(segments), step_columns(segments)
     if len(steps) < 2:

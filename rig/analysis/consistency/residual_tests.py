@@ -136,9 +136,12 @@ def minimal_detectable_size(model_basis: Array, patterns: Array, alternatives: I
     """Return the smallest fault that at least one test detects in 95 of 100 recordings; inf if none does.
 
     This is Baarda's minimal detectable bias (1968): under the fault a test's statistic is non-central χ². All arguments
-    are whitened. `model_basis` (n, p): orthonormal columns of the model. `patterns` (n, k): readings per unit fault,
-    one column for each form that the fault may have; the form that is detected worst decides. `alternatives`: the
-    columns of each test, and the test's critical value as a function of their number.
+    are whitened.
+
+    - `model_basis` (n, p): orthonormal columns of the model.
+    - `patterns` (n, k): the readings due to a fault of size 1, with a column for each form that the fault may have. The
+      form that is detected worst decides.
+    - `alternatives`: the columns of each test, and the test's critical value as a function of their number.
     """
     from scipy.special import chndtrinc
 

@@ -135,8 +135,8 @@ def build_whitener(segments: Segments, scatter: Scatter, bias: BiasProcess) -> A
 
     Noise and bias drift of each axis are whitened first, then the shared errors. Shared errors may be 10⁵ times the
     noise (a free nonlinearity), so one decomposition of both would lose the noise to rounding. In the first part, no
-    variance may be below the smallest noise: if a clock was set back, windows overlap, and the drift's matrix is no
-    covariance.
+    variance is allowed below the smallest noise, because after a clock was set back windows overlap, and the drift's
+    matrix is no covariance.
     """
     count, bias_covariance = len(segments.sweep), bias.covariance(segments.times_s)
     noise_whitener, least = np.zeros((3, count, 3, count)), segments.variances_rad2_s2.min()

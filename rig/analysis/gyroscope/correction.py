@@ -1,11 +1,11 @@
 """The correction g = M (m + b) of readings m to rates g, on the board and in `calibration.h`. Pure functions.
 
-M is a 3×3 matrix, b the bias. `diagonal` is the correction of the paper SIX: M = K, axis by axis. `matrix` also makes
-the axes orthogonal. In the vector model m = F ω − b, polar decomposition gives F = K⁻¹ S R: R is the rotation nearest
-to the three axes (the result's `mounting`), and the symmetric S contains their non-orthogonality. M = R F⁻¹ = S⁻¹ K
-takes a reading to the frame into which R rotates the flange's frame. A QR decomposition would keep the direction of one
-axis and put the whole error on the other two; R prefers no axis, and defines the frame in which a verification compares
-two sensors.
+M is a 3×3 matrix, b the bias. The correction "diagonal" is that of the paper SIX, with the diagonal matrix M = K of the
+scale factors. The correction "matrix" also makes the axes orthogonal. In the vector model m = F ω − b, polar
+decomposition gives F = K⁻¹ S R: R is the rotation nearest to the three axes (the result's `mounting`), and the
+symmetric S contains their non-orthogonality. M = R F⁻¹ = S⁻¹ K takes a reading to the frame into which R rotates the
+flange's frame. A QR decomposition would keep the direction of one axis and put the whole error on the other two; R
+prefers no axis, and defines the frame in which a verification compares two sensors.
 """
 
 from dataclasses import dataclass

@@ -44,7 +44,7 @@ class RecordingPart:
 def collect_inputs(recordings: Sequence[ObservedRun], sensor: str, environment: MeasurementEnvironment) -> VectorInputs:
     """Return the arm's motion and the readings in each average of a sensor, from all recordings of a run.
 
-    Speeds are corrected for the controller's clock: if it runs too fast, recorded speeds are too small.
+    Speeds are corrected for the controller's clock, because if it runs too fast, the recorded speeds are too small.
     """
     run = recordings[0].run
     parts = [

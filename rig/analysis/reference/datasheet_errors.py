@@ -169,7 +169,8 @@ def separate_sensor_errors(
 ) -> tuple[FitUncertainty, list[Contributor]]:
     """Return the uncertainty due to noise and arm, and the contributors of the sensor's own errors in this `movement`.
 
-    `spread` is the uncertainty of a fit that includes φ, so the noise has a larger effect than in a fit without φ.
+    `spread` is the uncertainty of a fit that includes the quadratic terms, in which noise has a larger effect than in a
+    fit without these terms.
     """
     drift, flicker = (
         spread.response @ shared @ spread.response.T

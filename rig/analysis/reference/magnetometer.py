@@ -1,7 +1,7 @@
 """The calibration of magnetometers on an arm, from dwells in known attitudes: Eq. (7) of the paper TRIAX.
 
 The bias contains the field of iron and currents that turn with the magnetometer, also in the arm, which no residual
-shows. Runs with the sensor turned over separate this field: `rig.analysis.reversal`.
+shows. Runs with the sensor turned over separate this field (`rig.analysis.reversal`).
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -32,7 +32,7 @@ REMEDY = "Take iron and currents away, or measure farther from them; set the sen
 
 @dataclass(frozen=True, slots=True)
 class MagnetometerResult:
-    """One magnetometer's calibration m = F B + b, in the axes of its nominal mounting.
+    """One magnetometer's calibration, reading m = F B + b of a field B, in the axes of its nominal mounting.
 
     - `field_t`: the size of the field; `extension_m` (3,): the sensor's position on the flange.
     - `triad`: scale, relative to `field_t`, and axes, with the solution's uncertainty; `budget`: the uncertainty.
@@ -59,7 +59,7 @@ def calibrate_magnetometers(
 ) -> Attempts[str, MagnetometerResult]:
     """Return the calibration of every recorded magnetometer, or its Fault.
 
-    The `accelerometers` bound the error of the arm's attitudes. Faults: `no_attitudes` without dwells,
+    The `accelerometers` bound the error of the arm's attitudes. The Faults are `no_attitudes` without dwells,
     `field_strength_unknown`, `field_drifts`, `field_not_uniform`, `swapped_axes`, `mirrored_axis`, `wrong_mounting`,
     and those of `field_readings` and `solve_triaxial`.
     """

@@ -21,7 +21,7 @@ def plan_servo_six_observation(
     start_q_rad: Joints | None = None,
     done: Collection[int] = (),
 ) -> Plan:
-    """Return the plan: in each of three or more mountings a small trial turn, then a turn, a turn back, and rests.
+    """Return a plan with a small trial turn, a turn, a turn back, and rests in each of three or more mountings.
 
     Each turn is a revolution and `overtravel_deg` more at constant speed, centred on `servo.home_deg`, so that a cable
     winds by slightly more than half a turn in either direction. `start_q_rad` is the shaft's angle (home if None); from
