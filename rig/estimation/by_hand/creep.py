@@ -39,7 +39,7 @@ def find_creeping_rests(fit: GraphFit) -> tuple[int, ...]:
         distances = _distances_from_neighbours(middles_s, biases, left_out)
         if not distances.any():
             return ()
-        left_out.append(int(np.argmax(distances)))
+        left_out.append(int(np.argmax(distances)))  # a creep looks like a bias far from its neighbours'
         rows = _leave_out_rests(fit.factors, left_out)
         if explains(rows):
             is_jump = any(explains(rows_with_jump) for rows_with_jump in _allow_jumps(fit.factors, left_out))

@@ -145,7 +145,7 @@ def average_fixes(recorded: AttitudeSamples, state: DriftState) -> FixedAttitude
         np.add.at(total, fixes.fix, values * weights.reshape(-1, *[1] * (values.ndim - 1)))
         return total
 
-    left_vectors, _, right_vectors = np.linalg.svd(mean(samples))
+    left_vectors, _, right_vectors = np.linalg.svd(mean(samples))  # for the rotation nearest to each mean
     left_vectors[..., -1] *= np.linalg.det(left_vectors @ right_vectors)[:, None]
     first, last = (np.searchsorted(fixes.fix, np.arange(count), side=side) for side in ("left", "right"))
     return FixedAttitudes(

@@ -81,9 +81,9 @@ class _LinearisedPlacements:
         covariance = errors[NOISE] + errors[ATTITUDES] + errors[PLACEMENTS]
         weighted = np.linalg.solve(covariance, self.design)
         columns = self.design.shape[-1]
-        across = np.swapaxes(weighted.reshape(len(zetas), -1, columns), 1, 2)
+        across = np.swapaxes(weighted.reshape(len(zetas), -1, columns), 1, 2)  # JᵀV⁻¹ (k, q, 3 N)
         information = across @ self.design.reshape(-1, columns)
-        unit = 1 / np.sqrt(np.diagonal(information, axis1=1, axis2=2))
+        unit = 1 / np.sqrt(np.diagonal(information, axis1=1, axis2=2))  # the scaled matrix is well conditioned
         unit = unit[:, :, None] * unit[:, None]
         inverse = np.linalg.inv(information * unit) * unit
         steps = (inverse @ (across @ self.residuals.ravel())[..., None])[..., 0]

@@ -177,7 +177,7 @@ def _fit(
     """Return the fit of the vector model with common errors; the last ones are the Earth's rate along `directions`."""
     speeds = np.linalg.norm(inputs.turns_rad_s, axis=1)
     durations = np.diff(inputs.windows_s).T[0]
-    by_states = np.sqrt(2) * prior.state_jitter_s * inputs.state_gains / durations * speeds
+    by_states = np.sqrt(2) * prior.state_jitter_s * inputs.state_gains / durations * speeds  # at both ends
     speed_std = np.hypot(inputs.speed_std_rad_s, by_states)
     arm_errors = [
         np.zeros((0, *inputs.means_rad_s.shape)) if inputs.axis_errors_rad_s is None else inputs.axis_errors_rad_s

@@ -33,7 +33,7 @@ def newton_batch(means_rad_s: ArrayLike, speeds_rad_s: ArrayLike) -> BatchSoluti
     p, q, square = _responses(means - centre[:, None], speeds_rad_s)
     with np.errstate(all="ignore"):
         total = np.sum(q[:, 3:] ** 2 / (4 * q[:, :3]), axis=1)
-        gamma = square * total / (1 + total)
+        gamma = square * total / (1 + total)  # the closed form, exact if all speeds are equal
         step = np.full(len(gamma), np.inf)
         steps = np.zeros(len(gamma), dtype=np.int64)
         for _ in range(NEWTON_LIMIT):
@@ -42,8 +42,8 @@ def newton_batch(means_rad_s: ArrayLike, speeds_rad_s: ArrayLike) -> BatchSoluti
                 break
             beta = p - gamma[:, None] * q
             bias = beta[:, 3:] / (2 * beta[:, :3])
-            value = np.sum(beta[:, :3] * bias**2, axis=1) - gamma
-            slope = np.sum(bias * (bias * q[:, :3] - q[:, 3:]), axis=1) - 1
+            value = np.sum(beta[:, :3] * bias**2, axis=1) - gamma  # Γ(β) − γ
+            slope = np.sum(bias * (bias * q[:, :3] - q[:, 3:]), axis=1) - 1  # its derivative by γ
             step = np.where(active, value / slope, step)
             gamma = np.where(active, gamma - step, gamma)
             steps += active
@@ -70,7 +70,7 @@ def algorithm_1_batch(means_rad_s: ArrayLike, speeds_rad_s: ArrayLike) -> BatchS
             improved = p[rows] - gamma[:, None] * q[rows]
             change = np.sum(np.abs(improved - beta[rows]), axis=1)
             done = change <= ALGORITHM_1_TOLERANCE
-            growing = ~done & ~(change < last_change[rows])
+            growing = ~done & ~(change < last_change[rows])  # these runs diverge
             beta[rows], last_change[rows] = improved, change
             passes[rows] += 1
             converged[rows[done]] = True

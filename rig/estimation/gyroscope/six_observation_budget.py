@@ -54,7 +54,7 @@ def six_observation_budget(explained: VectorFit, six: Solution, unknown: Unknown
     contributors = [
         contributor
         for contributor in of_readings.contributors
-        if contributor.name not in (AXES, REPEATABILITY, REMOUNTING)
+        if contributor.name not in (AXES, REPEATABILITY, REMOUNTING)  # errors of directions have no effect
     ]
     return replace(of_readings, contributors=(*contributors, square))
 

@@ -126,24 +126,24 @@ def _likelihoods(motion: StatedMotion, axis_rad: float, rates: Array) -> Array:
     design = design / np.linalg.norm(design, axis=0)
     count, columns = design.shape
     parameters = 3 * columns
-    weighted = (precision @ motion.rate_patterns[..., None])[..., 0]
+    weighted = (precision @ motion.rate_patterns[..., None])[..., 0]  # V⁻¹ d, d being the effect of a rate error
     of_rate = np.sum(motion.rate_patterns * weighted, axis=1)  # for each sweep: its squared rate error over its noise
-    gains = (weighted[:, :, None] * design[:, None, :]).reshape(count, parameters)
+    gains = (weighted[:, :, None] * design[:, None, :]).reshape(count, parameters)  # XᵀV⁻¹ d of each sweep
     products = (design[:, :, None] * design[:, None, :]).reshape(count, -1)
     blocks = (precision.reshape(count, 9).T @ products).reshape(3, 3, columns, columns)
-    information = np.swapaxes(blocks, 1, 2).reshape(parameters, parameters)
+    information = np.swapaxes(blocks, 1, 2).reshape(parameters, parameters)  # XᵀV⁻¹ X
     whitened = (precision @ motion.residuals_rad_s[..., None])[..., 0]
-    observed = (whitened.T @ design).ravel()
-    misfit = np.sum(motion.residuals_rad_s * whitened)
-    projected = np.sum(weighted * motion.residuals_rad_s, axis=1)
+    observed = (whitened.T @ design).ravel()  # XᵀV⁻¹ r of the residuals r
+    misfit = np.sum(motion.residuals_rad_s * whitened)  # rᵀV⁻¹ r
+    projected = np.sum(weighted * motion.residuals_rad_s, axis=1)  # dᵀV⁻¹ r of each sweep
 
     variances = rates[:, None] ** 2 * np.ones(count)  # (k, N)
-    updates = variances / (1 + variances * of_rate)
+    updates = variances / (1 + variances * of_rate)  # (V + ρ² d dᵀ)⁻¹ = V⁻¹ − update · V⁻¹ d dᵀ V⁻¹
     dyads = (gains[:, :, None] * gains[:, None, :]).reshape(count, -1)
     informations = information - (updates @ dyads).reshape(-1, parameters, parameters)
     observations = observed - (updates * projected) @ gains
     misfits = misfit - updates @ projected**2
-    unit = 1 / np.sqrt(np.einsum("kaa->ka", informations))
+    unit = 1 / np.sqrt(np.einsum("kaa->ka", informations))  # scaled to a unit diagonal against rounding
     scaled = unit[:, :, None] * informations * unit[:, None, :]
     fitted = np.linalg.solve(scaled, (unit * observations)[..., None])[..., 0]
     explained = np.einsum("ka,ka->k", unit * observations, fitted)

@@ -102,7 +102,7 @@ def first_harmonic(
     mean_speed = turn.speed_rad_s
     uneven = _smooth(t, angle, mean_speed)
     columns = np.hstack([_fourier_columns(angle, HARMONICS), _list_vibration(uneven, angle, mean_speed)])
-    columns = np.hstack([columns, swings(_regression(columns, m)[1])])
+    columns = np.hstack([columns, swings(_regression(columns, m)[1])])  # oscillations left in the residuals
     inverse, residuals = _regression(columns, m)
     size = np.linalg.norm(columns, axis=0)
     rank = np.linalg.matrix_rank(columns / np.where(size > 0, size, 1.0), rtol=EMPTY_COLUMN_RATIO)
