@@ -167,8 +167,8 @@ def _find_turn_lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines
     ripple = find_lines(ripple_rate, search, fraction=turn.fraction)
     columns = waves(ripple, turn.fraction, ENCODER_SEARCH.sidebands)
     sizes = fit_columns(columns, ripple_rate)
-    fast = ~slow_columns(ripple, ENCODER_SEARCH.sidebands)
-    slow = ripple_rate - columns[:, fast] @ sizes[fast]
+    fast = ~slow_columns(ripple, ENCODER_SEARCH.sidebands)  # mask of the columns of fast lines
+    slow = ripple_rate - columns[:, fast] @ sizes[fast]  # the ripple without its fast lines
     slow_part = _fit_slow_part(slow, turn.fraction)
     smooth = slow_part if _has_slow_ripple(slow) else none
     late = _changes(smooth) if turn.closed else none  # over an arc it resembles encoder errors

@@ -97,7 +97,7 @@ def shortest_run(config: RigConfig, wanted: TargetUncertainty) -> ShortestRun:
     evaluated = [*(floor for _, floor in floors), *coarse.evaluated]
     unreachable = not any(wanted.is_met_by(budgets.reached) for budgets in evaluated)
     if coarse.best is None and unreachable and able and wanted.at_most_s < inf:
-        unreachable = find_shortest(hopeful, what.predict, replace(wanted, at_most_s=inf)).best is None
+        unreachable = find_shortest(hopeful, what.predict, replace(wanted, at_most_s=inf)).best is None  # no time limit
     fine = find_shortest(what.finer(coarse.best.candidate), what.predict, wanted) if coarse.best else SearchResult()
     best = fine.best or coarse.best
     best = best and _add_target(best, what.ending(best.candidate.procedure, wanted))

@@ -173,7 +173,7 @@ def _find_spikes(windows: Sequence[RawReadings], step_counts: Array) -> tuple[fl
             near = np.abs(np.abs(deviations[beyond, axis]) - 2**power) < np.maximum(
                 3 * deviation[axis], 0.05 * 2**power
             )
-            sizes[axis].append(np.where(near, power, -1))
+            sizes[axis].append(np.where(near, power, -1))  # -1: no power of two
     return farthest, sum(_is_one_bit(np.concatenate(powers)) for powers in sizes)
 
 

@@ -35,7 +35,7 @@ def check_agree(data: ExternalData) -> None:
     sensitivity = float(np.linalg.norm(coefficients[:3], 2))
     if np.linalg.matrix_rank(design) < design.shape[1] or not sensitivity:
         return
-    apart = (means - design @ coefficients) / redundancy
+    apart = (means - design @ coefficients) / redundancy  # leave-one-out residuals
     errors = np.linalg.norm(apart, axis=1) / sensitivity
     noise = np.linalg.norm(np.sqrt(variances) / redundancy, axis=1)
     sweeps = slice(len(data.sweeps))
@@ -84,7 +84,7 @@ def sweep_errors(solution: VectorSolution, data: ExternalData) -> SweepErrors | 
     means, variances, design = _equations(data)
     stated = StatedMotion.from_residuals(solution.residuals_rad_s, design[:, :3], variances, solution.matrix)
     sizes = motion_errors(stated)
-    gain = _derivatives(design, means, variances)
+    gain = _derivatives(design, means, variances)  # (12, N, 3): matrix, offset by readings
     noise = np.einsum("qni,ni->qni", gain, np.sqrt(variances)).reshape(12, -1)
     by_rate = np.einsum("qni,ni->qn", gain, stated.rate_patterns)
     by_axis = np.einsum("qni,kni->qkn", gain, stated.axis_patterns).reshape(12, -1)

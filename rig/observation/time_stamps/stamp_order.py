@@ -319,7 +319,7 @@ def _separate_equal(log: _UnorderedLog) -> _UnorderedLog:
     interval_s, rounded_s = find_typical_interval_s(log.stamps_s), find_resolution_s(log.stamps_s)
     uneven_s = abs(interval_s - rounded_s * round(interval_s / rounded_s)) if rounded_s else 0.0
     slips = rounded_s > COARSE_RATIO * interval_s and (uneven_s > ROUNDING * rounded_s or len(equal) > MAX_EQUAL)
-    if sampling.width > 1 or sampling.on_arrival or slips:
+    if sampling.width > 1 or sampling.on_arrival or slips:  # equal stamps are usual in such a log
         return log
     before = np.append(np.inf, steps_s)[equal] > 1.5 * sampling.interval_s
     after = np.append(steps_s, np.inf)[equal + 1] > 1.5 * sampling.interval_s
