@@ -1,4 +1,4 @@
-"""The contents of another program's file, read by the functions that solve it."""
+"""The contents of another program's file, read by the functions that also read it for a calibration."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

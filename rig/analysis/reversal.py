@@ -19,7 +19,7 @@ REMEDY = (
 
 @dataclass(frozen=True, slots=True)
 class ReversalRun:
-    """The result of the run named `run`."""
+    """A magnetometer's `result` in the run named `run`, and the `outcome` of that run."""
 
     run: str
     outcome: Outcome

@@ -61,7 +61,7 @@ def attitude_residual_std(solution: "TriaxialSolution", inputs: "Dwells") -> Arr
 
 
 def _residual_std(fit_matrix: Array, covariance: Array) -> Array:
-    """Return the std (K, 3) of residuals of readings of this `covariance`; `fit_matrix` maps readings to the fit."""
+    """Return the std (K, 3) of the residuals of readings with `covariance`; `fit_matrix` maps readings to the fit."""
     residual_maker = np.eye(len(fit_matrix)) - fit_matrix
     std: Array = np.sqrt(np.diag(residual_maker @ covariance @ residual_maker.T).clip(min=0.0)).reshape(-1, 3)
     return std

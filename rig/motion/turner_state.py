@@ -117,7 +117,7 @@ class ArmState:
     safety_status_bits: int
 
     def to_record(self) -> Row:
-        """Return the values in the order of `ARM_STATE_DTYPE`: one row for `np.array([...], ARM_STATE_DTYPE)`."""
+        """Return the values in the order of `ARM_STATE_DTYPE`, as one row for `np.array([...], ARM_STATE_DTYPE)`."""
         return _IN_ORDER(self)  # `astuple` would copy every value: 10 % of a run's computing
 
     @property

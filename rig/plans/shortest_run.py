@@ -259,7 +259,7 @@ class _TurnerSearch:
             return None
 
     def ending(self, procedure: ProcedureSection, wanted: TargetUncertainty) -> Mapping[str, float]:
-        """Return the keys that state the target, if the run has several repeats and no stages, else none."""
+        """Return the procedure's keys that state the target; there are none without repeats, or with stages."""
         if not isinstance(procedure, SixObservationSection) or procedure.repeats == 1 or procedure.stages:
             return {}
         sizes = {"target_scale_u": wanted.scale, "target_bias_u_rad_s": wanted.bias_rad_s}

@@ -44,7 +44,7 @@ class ReferenceModel:
 
 
 def alternatives(model: ReferenceModel) -> Alternatives:
-    """Return every alternative's effects (3 K, k) on readings, by the check's name; None tests all residuals."""
+    """Return every alternative's effects (3 K, k) on readings, by the check's name; None stands for all residuals."""
     s, f, time = find_force(model.theta, model.movement), matrix(model.theta), _time(model)
     columns: dict[str, Array | None] = {
         "bias_changed": bias_drift_columns(model),

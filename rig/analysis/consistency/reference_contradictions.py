@@ -88,7 +88,7 @@ class ReferenceStatistics:
 def read_accelerometer(
     name: str, recordings: Sequence[ObservedRun], result: "AccelerometerResult", uncertainty: Uncertainty
 ) -> ReferenceReadings:
-    """Return an accelerometer's readings in a run, in the order of its solution, with its stated `uncertainty`."""
+    """Return an accelerometer's readings in a run, in the order of its solution, given the stated `uncertainty`."""
     matrix = result.solution.matrix
     dwells = [dwell for recording in recordings for dwell in raw_acceleration_dwells(name, recording, matrix)]
     segments = list_windows(name, recordings, result.dwells)

@@ -63,7 +63,7 @@ def predict_budgets(config: RigConfig, plan: Plan, turner: TurnerIdentity) -> di
 
 
 def _budget(config: RigConfig, run: PlannedRun, turner: TurnerIdentity, name: str, sensor: SensorSection) -> Budget:
-    """Return the predicted budget of a gyroscope, by the analysis of simulated readings of the plan."""
+    """Return the predicted budget of a gyroscope, from an analysis of readings that are simulated for the plan."""
     uncertainty, mounting = run.uncertainty, mounting_matrix(sensor.mounting)
     noisy_angles = turner.reading_std_rad > 0
     # The scatter of the readings already includes the jitter.

@@ -324,7 +324,7 @@ def _gyroscope(item: Item, result: Result, clock: TimeBase | None) -> SensorResu
 
 
 def _describe_as_swept(result: Result) -> TurnedSolution:
-    """Return a solution in which the bias is a part of the reading in the form of rate = scale × (reading + bias)."""
+    """Return the solution in the form rate = scale × (reading + bias), which solutions of sweeps have too."""
     solution, matrix = result.solution, result.solution.matrix
     axes = SensorAxes.from_matrix(matrix)
     of_matrix = np.r_[F, OFFSET]

@@ -94,7 +94,7 @@ def sweep_errors(solution: VectorSolution, data: ExternalData) -> SweepErrors | 
     rate_variance, axis_variance = sizes.median_variances
 
     def inflate(to_values: Array, dof: float, noise_dof: float) -> Array:
-        """Return the covariance (q, q), without noise, of values with the derivatives `to_values` by matrix and offset.
+        """Return the covariance (q, q), without noise, of values with the derivatives `to_values` (q, 12).
 
         The covariance is that of motion errors of the median size. For each value it is scaled so that, together with
         the noise, it gives the expanded uncertainty that follows from the posterior distribution of the errors' sizes.

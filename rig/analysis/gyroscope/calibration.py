@@ -255,7 +255,7 @@ def solve_vector(
 
 
 def solve_six_observation(observations: Sequence[Observation], estimator: SixObservationEstimator) -> Solution:
-    """Return the six-observation solution, weighted by inverse variance, or equally by the paper's algorithm."""
+    """Return the six-observation solution; the weights are inverse variances, or equal for the paper's algorithm."""
     accumulated = Accumulator.empty()
     for observation in observations:
         average = observation.average

@@ -142,7 +142,7 @@ def lag_pattern(movement: Movement, lag_s: float) -> Array:
 
 
 def drift_patterns(matrix: Array, attitudes: Array, drift: FieldDrift | None) -> tuple[Array, float]:
-    """Return the patterns (3, 3 N) of a field that changes linearly over the attitudes, and its change in T.
+    """Return the patterns (3, 3 N) of a field that changes linearly over the attitudes, and the field's change, T.
 
     Each axis of the base has one pattern. If the `drift` was tested, the change is its standard uncertainty, else an
     assumed half-width.

@@ -22,7 +22,7 @@ class MoveIntegrals:
     """The rotations of the body in k moves.
 
     - `rotations` (k, 3, 3): R from body coordinates at the end to those at the start. A change δ of the parameters
-      makes it exp(J δ) R, with J `by_matrix` (k, 3, 9), `by_bias` (k, 3, 3), `by_gravity` (k, 3, 9) or
+      changes R to exp(J δ) R, with J `by_matrix` (k, 3, 9), `by_bias` (k, 3, 3), `by_gravity` (k, 3, 9) or
       `by_nonlinearity` (k, 3, 6).
     - `swept_rad` (k, 3): the integral of the reading minus offset, g-sensitivity and nonlinearity.
     - `durations_s` (k,) of the moves; `paths_rad` (k,): the total angle turned, in whichever direction.

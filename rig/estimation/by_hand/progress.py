@@ -47,7 +47,7 @@ class SessionProgress:
 
 
 def assess_progress(session: HandRecording, conditions: SessionConditions) -> SessionProgress:
-    """Assess an unfinished session of one rest or more; few rests are not an error.
+    """Return the progress of an unfinished session of one rest or more; few rests are not an error.
 
     Raise Fault `mirrored_axis`, `swapped_axes`, `wrong_unit`; Refused `first_face_unknown`.
     """

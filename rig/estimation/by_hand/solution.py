@@ -106,7 +106,7 @@ class HandSolution:
 
 
 def solve_by_hand(session: HandRecording, conditions: SessionConditions) -> HandSolution:
-    """Solve a session by hand.
+    """Return the calibration from a session in which a hand turns the sensors.
 
     Raise Fault `too_few_moves`, `clipping`, `lost_in_move`, `held_not_laid_down`, `turn_not_closed`, `not_flat`,
     `table_moved`, `bias_jumped`, `accelerometer_jumped`, `wrong_face`, `mirrored_axis`, `swapped_axes`, `wrong_unit`,

@@ -110,7 +110,7 @@ class _PlacementFits:
 
 
 def laid_down(theta: Array, placed: AttitudeReadings, unplaced: Array, unplaced_variances: Array) -> PlacementSolution:
-    """Re-estimate the solution `theta` (p,) with placement errors; `unplaced` (k, 3) are readings without attitudes."""
+    """Return a new fit from `theta` (p,), with placement errors; `unplaced` (k, 3) are readings without attitudes."""
     all_rests = _add_unplaced(theta, placed, unplaced, unplaced_variances)
     free = free_directions(theta, norm_known=all_rests.norm_known)
     linear = _LinearisedPlacements(

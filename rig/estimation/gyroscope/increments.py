@@ -176,7 +176,7 @@ class _IncrementSteps:
     durations_s: Array
 
     def differentiate(self, inverse: Array) -> Array:
-        """Return the derivatives (k, 3, 3) of the steps' rotations by the integrated error of the readings.
+        """Return the derivatives (k, 3, 3) of the steps' rotations with respect to the readings' integrated error.
 
         The rotation is in body coordinates at the start. The attitude half-way is used for the whole step, which for a
         step by the angle φ causes a relative error of about φ²/24.

@@ -133,7 +133,7 @@ class VectorInputs:
         return np.concatenate([none, *(own_error.patterns / np.sqrt(3) for own_error in self.list_own_errors(matrix))])
 
     def centripetal_m_s2(self, lever_arm_m: Array) -> Array:
-        """Return the acceleration (N, 3), flange's frame, at a lever arm (3,) or (N, 3) from the rotation axis."""
+        """Return the acceleration (N, 3) in the flange's frame, at a lever arm (3,) or (N, 3) from the axis."""
         return centripetal_m_s2(self.turns_rad_s, lever_arm_m)
 
 

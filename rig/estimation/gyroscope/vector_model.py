@@ -3,7 +3,7 @@
     m = F ω + c (+ G a),   F_i = a_i / k_i,   c = −b
 
 m is the mean reading (rad/s), ω the mean angular rate in the flange frame (unit axis × speed, zero for a rest), a_i the
-unit vector of sensor axis i in the flange frame. It is the model of the paper SIX, rate = K (m + b), with a rate of
+unit vector of sensor axis i in the flange frame. This is the model of the paper SIX, rate = K (m + b), with a rate of
 known direction: k_i = 1 / ‖row i of F‖ and b = −c, so every sweep and every rest determines all three biases. The
 mounting rotation and the non-orthogonality of the axes are estimated, not assumed. If the apparent gravity a in the
 flange frame (m/s²) is given, G (3×3, rad/s per m/s²) is the g-sensitivity.
@@ -188,7 +188,7 @@ def fit_coefficients(
 ) -> tuple[Array, Array, Array | None]:
     """Return the coefficients and the map of `regress`, and the effect (N, 3) of the speeds' errors on the readings.
 
-    The weights include this effect. It is None if all speeds are exact.
+    The weights include this effect. The effect is None if all speeds are exact.
     """
     coefficients, inverse = regress(design, means, variances, shared)
     if not speed_std.any():

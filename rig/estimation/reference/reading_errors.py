@@ -39,8 +39,8 @@ def noise(theta: Array, movement: Movement) -> Array:
 def nonlinearity_patterns(theta: Array, movement: Movement) -> Array:
     """Return the effects (P, 3 K) on the readings of one standard uncertainty of each axis' nonlinearity.
 
-    The quadratic and the cubic nonlinearity of `accelerometer_errors` come separately; one without uncertainty is left
-    out.
+    The quadratic and the cubic nonlinearity of `accelerometer_errors` come separately; a nonlinearity without
+    uncertainty is left out.
     """
     sensor = movement.sensor_errors
     if sensor is None:

@@ -1,12 +1,13 @@
 """The first harmonic of one revolution: mean, cosine and sine of accelerometer readings over the joint's angle.
 
-It is for an accelerometer what the mean of a revolution is for a gyroscope. The effects of the servo's vibration follow
-from the joint's own speed: centripetal acceleration by the change of ω², Euler acceleration by the angular acceleration
-α, and gravity by the joint's extra rotation during the filter's lag. One regression removes all these effects, so they
-neither bias the result nor count as noise. It also removes the second and the third harmonic, due to angle errors and a
-nonlinear sensor. Changes of the speed with one to four periods per revolution cannot be separated from gravity, so
-their effect remains. An oscillation of the arm that its encoders do not measure is a peak in the spectrum of the
-residuals. It is removed as well, because a revolution is not a whole number of the oscillation's periods.
+This harmonic is for an accelerometer what the mean of a revolution is for a gyroscope. The effects of the servo's
+vibration follow from the joint's own speed: centripetal acceleration by the change of ω², Euler acceleration by the
+angular acceleration α, and gravity by the joint's extra rotation during the filter's lag. One regression removes all
+these effects, so they neither bias the result nor count as noise. It also removes the second and the third harmonic,
+due to angle errors and a nonlinear sensor. Changes of the speed with one to four periods per revolution cannot be
+separated from gravity, so their effect remains. An oscillation of the arm that its encoders do not measure is a peak in
+the spectrum of the residuals. It is removed as well, because a revolution is not a whole number of the oscillation's
+periods.
 """
 
 from collections.abc import Callable

@@ -32,7 +32,7 @@ MIN_HELD_S, MAX_HELD_RATE_RAD_S, BLOCK_S = 0.75, 0.15, 0.25
 def segment_session(
     time_s: Array, rates: Array, acceleration: Array | None = None, *, range_rad_s: float | None = None
 ) -> HandRecording:
-    """Divide readings (n, 3), in rad/s and m/s², at rising times (n,), into rests and moves.
+    """Return the rests and moves that readings (n, 3), in rad/s and m/s², at rising times (n,) show.
 
     `range_rad_s` is the gyroscope's range, None if unknown.
     """

@@ -97,9 +97,9 @@ def _list_stages(
 
 
 def _iterate_clock(clock: TimeBase, board_time_s: Array, readings: Array, motion: KnownMotion) -> TimeBase:
-    """Return the clock after Gauss–Newton steps until it settles; regular leaps extrapolate steps that shrink slowly.
+    """Return the clock after Gauss–Newton steps until it settles.
 
-    Raise Fault `time_base_not_found`.
+    Steps that shrink slowly are extrapolated at regular intervals. Raise Fault `time_base_not_found`.
     """
     moved, inflation = np.zeros(2), None
     for number in range(1, MAX_FINE_STEPS + 1):

@@ -290,7 +290,7 @@ def _rows(time_s: Array, rate: Array, fixes: _ReferenceRows) -> Rows:
 
 
 def _find_complete(rows: _ReferenceRows, counts: NDArray[np.intp], expected: Array) -> NDArray[np.intp]:
-    """Return the rows whose samples are complete.
+    """Return the indices of the rows whose samples are complete.
 
     Raise Fault `lost_samples` if no row is complete, or if most long rows lack samples. Short rows are not counted,
     because any gap may cover a whole short row.

@@ -122,7 +122,7 @@ def _convert(path: Path, columns: Columns, mapped: MappedColumns | None) -> Colu
 
 
 def _read(path: Path, table: CsvTable, quantity: Quantity) -> NDArray[np.bool_]:
-    """Return a mask (n,) of the rows that have a quantity. Raise Refused `not_a_number` if only some axes are blank."""
+    """Return a mask (n,) of the rows with the `quantity`. Raise Refused `not_a_number` if only some axes are blank."""
     blank = np.isnan([table.columns[name] for name in quantity.columns])
     if len(partly := np.flatnonzero(blank.any(axis=0) & ~blank.all(axis=0))):
         row = int(partly[0])

@@ -37,8 +37,8 @@ THRESHOLDS = ObservationThresholds(max_lost_fraction=0.01, max_speed_deviation=0
 class Files:
     """The file of `readings`, the file of the motion, and the item that was turned.
 
-    - `tells`: the kind of motion, "sweeps", "attitudes" or "turns". For "turns" there is no file; `motion` then holds
-      the user's declarations, by column.
+    - `tells`: the kind of motion, "sweeps", "attitudes" or "turns". For "turns" there is no file of the motion;
+      `motion` then holds the user's declarations, by column.
     - `recorded`: the time of recording, None for the time at which the readings' file was last written.
     - `columns`: a map of columns with other names than the rig's.
     """

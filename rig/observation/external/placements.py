@@ -147,10 +147,10 @@ def _join_rests(
 def _same_rest(
     time_s: Array, readings: Mapping[Quantity, Array], before: Window, after: Window, dwells: Sequence[Window]
 ) -> bool:
-    """Return whether the body lay still between two rests, but for a knock.
+    """Return whether the body lay still between two rests, except for a knock.
 
-    A knock is short, but within one of the `dwells`, which state one attitude, it may be longer.
-    In a gap of a gyroscope's readings the body may have turned, so the other quantities must show that it has not.
+    A knock is short, but within one of the `dwells`, which state one attitude, it may be longer. In a gap of a
+    gyroscope's readings the body may have turned, so the other quantities must show that it has not.
     """
     between = _closed_slice(time_s, Window(before.end_s, after.start_s))
     gap_s = float(np.diff(time_s[between]).max())

@@ -30,7 +30,7 @@ class TableMotion:
     """
 
     def __init__(self, middles_s: Array, attitudes: Array, rates_rad_s: Array | None) -> None:
-        """Interpolate the given rates, or those between attitudes. Raise Fault `time_base_not_found` without motion."""
+        """Interpolate the given rates, or those between attitudes. Raise Fault `time_base_not_found`."""
         order = np.argsort(middles_s)
         if rates_rad_s is None:
             order = order[_thin(middles_s[order])]

@@ -231,7 +231,7 @@ class ArmMotion:
         return {"time_s": self.time_s, **angles, **rates}
 
     def _mean_rates(self, time_s: Array, lasting_s: float, standing_rad: Array) -> Array:
-        """Return `mean_rates`, with joints at rest at the angles `standing_rad` (k,); NaN stands for a moving joint."""
+        """Return the rates of `mean_rates`; `standing_rad` (k,) are the angles of joints at rest, NaN for others."""
         moving = np.flatnonzero(np.isnan(standing_rad))
         if not len(moving):
             return np.zeros((len(time_s), 3))

@@ -210,10 +210,10 @@ def _sort(log: _UnorderedLog) -> _UnorderedLog:
 
 
 def _drop_held(log: _UnorderedLog) -> _UnorderedLog:
-    """Return the log without rows that repeat the readings before them for long, and then jump to other ones.
+    """Return the log without rows that repeat the readings before them for long, and then jump to other values.
 
     A sensor or a link that stops repeats its last reading. So does a coarse log of a body at rest. But if readings
-    rarely repeat otherwise, a long repetition is no chance, and at its end the readings jump if the body moved.
+    rarely repeat otherwise, a long repetition is no coincidence, and at its end the readings jump if the body moved.
     """
     steps = np.diff(log.readings, axis=0)
     same = (steps == 0).all(axis=1)

@@ -148,7 +148,7 @@ def _stations(home: Joints, procedure: SixSweepsSection, order: Sequence[str]) -
 
 
 def _list_orders(stations: tuple[SweepPose, ...], procedure: SixSweepsSection) -> Iterator[Order]:
-    """Yield every permissible order of directions, the paper's first."""
+    """Yield every permissible order of directions, beginning with the paper's order."""
     if procedure.directions is not None:
         yield Order(stations, (procedure.directions,) * len(stations), alternates=False)
         return

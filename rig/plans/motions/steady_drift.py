@@ -18,7 +18,7 @@ NEGLIGIBLE_RATIO = 1e-6  # to the largest singular value: directions that attitu
 class PlannedAverage:
     """A planned average: the flange's rate, the arm's pose (at the start of a sweep), and the middle and duration.
 
-    `on_the_way`: poses evenly along an arc; empty for whole turns.
+    `on_the_way`: poses spaced evenly along an arc; empty for whole turns.
     """
 
     rate_rad_s: Vector3

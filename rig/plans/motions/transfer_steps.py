@@ -10,7 +10,7 @@ from rig.motion.turner_state import Joints
 
 @dataclass(frozen=True, slots=True)
 class Pace:
-    """The speed and acceleration of a motion's joint that travels farthest."""
+    """The speed and acceleration of the joint that travels farthest in a motion."""
 
     speed_rad_s: float
     acceleration_rad_s2: float
