@@ -128,7 +128,7 @@ def _split(whole: Array, parts: dict[str, Array], budget: Budget) -> Array:
 
 
 def _angle_derivatives(matrix: Array) -> Array:
-    """Return the derivative (6, 3, 3) of the angles between the axes, then of their mounting, by the `matrix`."""
+    """Return the derivative (6, 3, 3), with respect to `matrix`, of the angles between axes, then of the mounting."""
     return SensorAxes.from_matrix(matrix).to_angles.reshape(6, 3, 3)
 
 

@@ -1,4 +1,4 @@
-"""Cubic splines by NumPy alone, because to import SciPy's would take every command a quarter of a second."""
+"""Cubic splines by NumPy alone, because an import of SciPy's would take every command a quarter of a second."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray

@@ -36,7 +36,7 @@ class State(Protocol):
     @property
     def qd_rad_s(self) -> Joints: ...
     def to_record(self) -> Row:
-        """Return the values in the order of `state_dtype`. (Called for hundreds of states a second.)"""
+        """Return the values in the order of `state_dtype`. This method is called for hundreds of states a second."""
         ...
 
 

@@ -15,7 +15,7 @@ FACE_AXES = np.array([axis_of(face) for face in FACES])
 
 
 def find_faces(session: HandRecording, conditions: SessionConditions, integrals: MoveIntegrals) -> RestFaces:
-    """Find the face of every rest. Raise Refused `first_face_unknown`."""
+    """Return the face of every rest. Raise Refused `first_face_unknown`."""
     has_level = session.acceleration is not None
     up = _read_verticals(session) if has_level else _track_verticals(conditions, integrals)
     cosines = up @ FACE_AXES.T

@@ -42,7 +42,7 @@ class Steps:
 
     @property
     def units(self) -> Array:
-        """The unit of each axis: (3,), unless stated for another number of axes."""
+        """The unit of each axis, (3,); one number for all axes is repeated."""
         unit = np.asarray(self.unit, dtype=np.float64)
         return unit if unit.ndim else np.broadcast_to(unit, 3)
 

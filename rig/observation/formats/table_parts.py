@@ -25,7 +25,7 @@ def read_blocks(
 ) -> Iterator[Part]:
     """Yield rows, with a number for each column, in blocks (n, columns), then the names of the columns.
 
-    The names are read after the last row: until then the reader may replace a name by None, which omits the column.
+    The names are read after the last row, because until then the reader may replace a name by None to omit the column.
     `counts` is added to the names in the last part: the number of `LEFT_OUT` rows, and a `NOTE`.
     """
     values, width = array("d"), len(columns)
