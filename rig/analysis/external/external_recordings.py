@@ -209,7 +209,7 @@ def _solve_sweeps(
 
 @contextmanager
 def _mention(omitted: Sequence[Omitted]) -> Iterator[None]:
-    """Add the readings that were left out before to the message of any Fault or Refused that the block raises."""
+    """Add what was `omitted` before the block to the message of any Fault or Refused that the block raises."""
     try:
         yield
     except (Fault, Refused) as error:

@@ -46,7 +46,7 @@ def line_columns(residuals: Array) -> Array:
 
 
 def fit_inflation(residuals: Array) -> float:
-    """Return the same as `fit_noise_factor`, for residuals (n,) that may still contain a part of a spectral line."""
+    """Return a factor like `fit_noise_factor`, but for residuals (n,) that may contain a part of a spectral line."""
     return fit_autoregression(residuals, SHORT_ORDERS).factor
 
 
