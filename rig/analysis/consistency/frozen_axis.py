@@ -15,8 +15,8 @@ MIN_CHANGE_STEPS, MIN_CHANGE_RAD_S = 10.0, 0.02  # of the rate about the axis, i
 def find_longest_frozen(recording: ObservedRun, name: str) -> int:
     """Return the longest run of equal readings of a gyroscope's axis while the true rate changed.
 
-    The nominal mounting is accurate enough, because a tilted axis or a wrong scale factor hardly alters a change of
-    rate.
+    The true rate is computed with the nominal mounting, because a tilted axis or a wrong scale factor hardly alters a
+    change of rate.
     """
     stream = recording.stream(name)
     counts = stream.sensor.channel(RATE).counts(stream.raw)
