@@ -70,7 +70,7 @@ class ParameterFits:
         self.slopes = slopes * rate[:, None]
         within = (readings.temperature_c - range_c[0]) / (range_c[1] - range_c[0])
         self.has_both_directions = min(np.mean(direction > 0), np.mean(direction < 0)) >= MIN_FRACTION
-        self.loop = (direction * 4 * within * (1 - within))[:, None]
+        self.loop = (direction * 4 * within * (1 - within))[:, None]  # zero at both ends, 1 in mid-range
         self._fit_inputs(readings, readings.means)
         self.process = self._process(readings, poses)
         weights = 1 / np.median(readings.variances, axis=1)
@@ -239,7 +239,9 @@ def heating_rate(windows_s: Array, temperature_c: Array) -> tuple[Array, Array]:
 
 
 def _coefficients_from_changes(centre: Array, which: int) -> Array:
-    """Return the matrix (12, 18) from the orders 1 to 3 of k and c to the orders 0 to 3 of k (`which` 0) or c (1).
+    """Return the matrix (12, 18) from the orders 1 to 3 of scale and bias to the orders 0 to 3 of one of them.
+
+    `which` is 0 for the scale and 1 for the bias.
 
     Order 0 is the value at the reference. The mean value over the readings is fixed, so an error of a coefficient
     changes order 0 by minus that error times the mean power of T − reference, `centre` (2, 3, 3).

@@ -62,7 +62,7 @@ def test_a_hands_turns_tell_the_scale_to_a_thousandth(tmp_path: Path) -> None:
 @pytest.mark.proof
 @pytest.mark.parametrize("hand", HANDS.values(), ids=HANDS)
 def test_uncertainties_are_those_of_many_sessions(tmp_path: Path, hand: Hand, thorough: bool) -> None:
-    """At a noise of 1 °/s the scatter of two rests may look like a change of the bias: a sound session is refused then."""
+    """At a noise of 1 °/s the scatter of rests may look like a change of the bias; few sound sessions are refused."""
     sessions = [turn(hand, seed) for seed in range(200 if thorough else 20)]
     results = [(or_fault(partial(solved, tmp_path, session)), session) for session in sessions]
     refused = [result.name for result, _ in results if isinstance(result, Fault)]
