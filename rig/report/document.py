@@ -46,7 +46,7 @@ def _mount(mount: EstimatedMount) -> MountEntry:
 
 
 def _plain_values(entries: Any) -> dict[str, Any]:
-    """Return entries of a kind from a package, in the form of JSON."""
+    """Return, as JSON values, the entries of a kind of result that an installed package defines."""
     return {name: sensor_entry.model_dump(mode="json") for name, sensor_entry in entries.items()}
 
 

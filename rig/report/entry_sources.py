@@ -21,14 +21,17 @@ from rig.data.entries.earth_rate import EarthRateEntry
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """The sources of an entry: by field, the name of the attribute of `classes` that fills it."""
+    """A row of the table: `attributes` has, by field of an entry, the attribute of `classes` that fills the field."""
 
     classes: tuple[str, ...]
     attributes: Mapping[str, str]
 
 
 def _row(*classes: str, same: str = "", **renamed: str) -> Row:
-    """Return the row of `classes`; a field's attribute has the same name (`same`) or another (`renamed`, by field)."""
+    """Return the row of `classes`.
+
+    `same` lists the fields whose attributes have the same name; `renamed` has the other attributes, by field.
+    """
     return Row(classes, {**{name: name for name in same.split()}, **renamed})
 
 

@@ -1,4 +1,4 @@
-"""The truth of a simulated laboratory next to the result: (result − truth)/U. For people, not for estimators."""
+"""The truth of a simulated laboratory next to the result: (result − truth)/U. Only people use it, no estimator."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -45,7 +45,7 @@ class _TruthFile:
 
 @dataclass(frozen=True, slots=True)
 class TrueValues:
-    """Values of the axes, their truth in the same unit, and (result − truth)/U."""
+    """Results of the axes, their true values in the same unit, and the deviations (result − truth)/U."""
 
     result: AxisValues
     truth: Sequence[float]

@@ -35,7 +35,7 @@ def accelerometer_lines(finding: Finding[AccelerometerEntry], _: Mapping[str, Ar
 
 
 def magnetometer_lines(finding: Finding[MagnetometerEntry], _: Mapping[str, Array]) -> Iterator[str]:
-    """Yield C source for a magnetometer in its mounting."""
+    """Yield C source for a magnetometer; the correction is valid only as mounted."""
     entry = finding.entry
     return _subtraction_lines(finding, entry.bias_t, entry.correction_matrix, "field_t", (
         f"/* Magnetometer {_comment(f'{entry.part}, serial number {entry.serial_number}')}: B = M (m - b), in tesla.",
@@ -100,7 +100,7 @@ def _subtraction_lines(
 ) -> Iterator[str]:
     """Yield bias, matrix and correction function of a sensor whose bias is subtracted from its reading.
 
-    `true` is the C name of the corrected value.
+    `true` is the C name of the corrected value; `about` are the lines of the comment above the C source.
     """
     name, unit = f"{prefix_of(finding.sensor)}_{finding.quantity}", finding.quantity.suffix
     yield from (

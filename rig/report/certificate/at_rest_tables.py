@@ -19,7 +19,7 @@ MICRO = 1e6
 
 @dataclass(frozen=True, slots=True)
 class ReversalRow:
-    """One axis of a magnetometer's reversal; `mixed`: it was not turned over, so its bias includes the arm's field."""
+    """One axis of a magnetometer's reversal. If `mixed`, it was not turned over: its bias includes the arm's field."""
 
     axis: str
     scale: Pair

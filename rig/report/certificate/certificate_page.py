@@ -42,7 +42,7 @@ FOOTING = "Relates only to the items calibrated. Not issued under an accreditati
 
 
 def certificate_page(certificate: Certificate) -> str:
-    """Return HTML that loads nothing from outside; texts of configuration, board and arm are escaped."""
+    """Return the certificate as HTML that loads nothing from outside, with all texts of other sources escaped."""
     return _template().render(certificate=certificate, deg=DEG, footing=FOOTING)
 
 
@@ -68,7 +68,10 @@ def _template() -> "Template":
 
 
 def write_certificate(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
-    """Write the certificate for any verdict. If the measurement is unfit, every page names the failed checks."""
+    """Write the certificate, whatever the verdict, and return the event of its file.
+
+    If the measurement is unfit, every page names the failed checks.
+    """
     path = folder / CERTIFICATE
     write_new(path, certificate_page(certificate_of(document, folder_statements(folder))))
     return (DocumentWritten(path),)

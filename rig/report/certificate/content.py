@@ -66,7 +66,7 @@ class RestCalibration:
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """A finding that a macro of a template prints (`macro_path`, as `template:macro`), with further characteristics."""
+    """A finding, its further characteristics, and the macro that prints them: `macro_path`, as `template:macro`."""
 
     macro_path: str
     finding: Finding[Any]
@@ -154,12 +154,12 @@ class Certificate:
 
     @property
     def words(self) -> Wording:
-        """The wording for the turner; neutral for external readings."""
+        """The wording for the kind of turner; external readings have a neutral wording."""
         return words_of(self.provenance.turner_kind or NO_ARM)
 
     @property
     def procedure(self) -> str:
-        """The script that moved the arm, and its hash."""
+        """The script that moved the arm with its hash, or the file of external readings, in words."""
         if self.provenance.readings_file is not None:
             return f"readings of the file {_file_words(self.provenance.readings_file)}"
         fields = self.provenance.model_dump()
@@ -216,7 +216,7 @@ class Certificate:
 
     @property
     def without_uncertainty(self) -> tuple[str, ...]:
-        """The calibrated sensors with only the noise part of the uncertainty."""
+        """The calibrated sensors whose stated uncertainty contains only noise."""
         return tuple(_find_incomplete(self.result))
 
     @property
@@ -228,7 +228,7 @@ class Certificate:
 def certificate_of(
     result: ResultDocument, stated: StatedFacts, reversals: Mapping[str, ReversalEntry] = MappingProxyType({})
 ) -> Certificate:
-    """Return the certificate of a result; everything in it, the number too, depends on the arguments alone.
+    """Return the certificate of a result; its whole content, including its number, depends on the arguments alone.
 
     Raise Refused `another_sensor` if reversals are of other magnetometers, or of other runs, than the result's.
     """

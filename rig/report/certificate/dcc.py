@@ -118,7 +118,7 @@ def _iterate_items(c: Certificate) -> Iterator[CertifiedItem]:
 
 
 def _keys(items: Iterable[CertifiedItem]) -> dict[tuple[str, str], str]:
-    """Return a key for each item, by kind and name; the items of a kind are numbered."""
+    """Return a key for each item, such as `gyroscope-0`, by kind and sensor name."""
     keys: dict[tuple[str, str], str] = {}
     for certified in items:
         kind_and_name = certified.item, certified.sensor

@@ -17,7 +17,7 @@ def temperature_entry(
 ) -> OverTemperatureEntry:
     """Return a sensor's polynomials of temperature in SI units.
 
-    A gyroscope's bias has the sign that it has in g = K (m + b), so it is minus the polynomials' offset of the reading.
+    A gyroscope's bias b has the sign of g = K (m + b); the polynomials contain the reading's offset, which is −b.
     """
     signs = np.array(quantity.parameter_signs)
     of_coefficients = np.repeat(signs, COEFFICIENT_COUNT // len(signs))

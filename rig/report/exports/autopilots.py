@@ -1,9 +1,10 @@
 """Parameter files of PX4 and ArduPilot: their corrections of gyroscopes, accelerometers and magnetometers.
 
-PX4 (src/lib/sensor_calibration): gyroscopes data − offset, accelerometers (data − offset) scale, magnetometers S (data
-− offset), S symmetric, in gauss. ArduPilot (AP_InertialSensor_Backend, AP_Compass): the same, except that offsets of a
-compass are added and in milligauss. ArduPilot replaces offsets of gyroscopes, INS_GYROFFS_X, …, at each boot unless
-INS_GYR_CAL is 0. Neither autopilot has a scale factor of a gyroscope.
+PX4 (src/lib/sensor_calibration) corrects gyroscopes as data − offset, accelerometers as (data − offset) scale, and
+magnetometers, in gauss, as S (data − offset) with a symmetric S. ArduPilot (AP_InertialSensor_Backend, AP_Compass)
+corrects likewise, except that it adds the offsets of a compass, which are in milligauss. ArduPilot replaces the offsets
+of gyroscopes, INS_GYROFFS_X, …, at each boot unless INS_GYR_CAL is 0. Neither autopilot has a scale factor of a
+gyroscope.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -40,7 +41,7 @@ Autopilot = Mapping[Quantity, Mapping[str, Callable[[SensorCorrection], Iterable
 
 
 def px4_files(calibrations: ExportedCalibrations) -> Mapping[str, str]:
-    """Return `px4.params` for QGroundControl: vehicle, component, name, value, type, separated by tabs."""
+    """Return the text of `px4.params` for QGroundControl; each line is vehicle, component, name, value and type."""
     lines = [
         *HEADING,
         "# Lost too: CAL_GYROn_ID, CAL_ACCn_ID, CAL_MAGn_ID, which only the vehicle has; PX4 uses parameters",
@@ -58,7 +59,7 @@ def px4_files(calibrations: ExportedCalibrations) -> Mapping[str, str]:
 
 
 def ardupilot_files(calibrations: ExportedCalibrations) -> Mapping[str, str]:
-    """Return the text of `ardupilot.param`: lines of a parameter's name and value."""
+    """Return the text of `ardupilot.param`; each line has a parameter's name and value."""
     lines = [*HEADING, *ARDUPILOT_NOTES, *_lines(calibrations, ARDUPILOT, lambda name, value: f"{name},{value!r}")]
     if polynomials := calibrations.over_temperature:
         lines += [

@@ -18,7 +18,7 @@ class ExportTable:
 
 
 def readings_table(run: RunData, sensor: str, channels: Sequence[Channel], time_s: Array, meaning: str) -> ExportTable:
-    """Return the readings of a sensor by `channels`, at times (n,), with their `meaning`."""
+    """Return a table of a sensor's times (n,) and of its readings in these `channels`, with their `meaning`."""
     recorded, columns = run.sensors[sensor], {"time_s": time_s}
     for channel in channels:
         values = channel.values(run.samples[sensor])
@@ -35,7 +35,7 @@ def split(names: Sequence[str], columns: Array) -> dict[str, Array]:
 
 
 def plain_names(names: Iterable[str]) -> dict[str, str]:
-    """Return a unique plain name, beginning with a letter, for each name."""
+    """Return a unique plain name for each name: ASCII letters, digits and `_`, beginning with a letter."""
     plain_by_name: dict[str, str] = {}
     for name in names:
         plain = "".join(c if c.isascii() and c.isalnum() else "_" for c in name)

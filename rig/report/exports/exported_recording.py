@@ -32,7 +32,7 @@ MOTION: Final[Mapping[MotionKind, str]] = {
 
 @dataclass(frozen=True, slots=True)
 class WithMotion:
-    """The recording of a turner with joints, after its observation, with the clock of its times."""
+    """The observed recording of a turner with joints, and the name of the clock to which its times refer."""
 
     observed: ObservedRun
     clock: str = "the arm controller's clock"
@@ -52,14 +52,14 @@ class WithMotion:
         return since_s
 
     def noise(self, sensor: str, quantity: Quantity) -> Sequence[Array]:
-        """Return the noise (3,) of one sample in each rest or, for accelerations, in each dwell."""
+        """Return the standard deviation (3,) of single samples in each rest or, for accelerations, in each dwell."""
         sensor_observations = self.observed.sensors[sensor]
         if quantity == ACCELERATION:
             return [dwell.reading.noise for dwell in sensor_observations.dwells]
         return [rest.noise_rad_s for rest in sensor_observations.rests]
 
     def tables(self) -> Iterator[ExportTable]:
-        """Yield the arm, then each sensor's readings, with accelerations in a table of their own, and its sweeps."""
+        """Yield a table of the arm's joints, then tables of each sensor's readings, accelerations and sweeps."""
         remark = f"Times are seconds of {self.clock}. {OMITTED_NOTE}"
         yield ExportTable("arm", self.observed.motion.table(), f"Joint angles and rates, from the ground up. {remark}")
         for name, sensor in self.run.sensors.items():
@@ -86,7 +86,7 @@ class WithMotion:
 
 @dataclass(frozen=True, slots=True)
 class ReadingsAlone:
-    """Readings without a recorded motion, from a session by hand or from files, with the clock of their times."""
+    """A recording without a recorded motion, from a session by hand or from files."""
 
     run: RunData
 

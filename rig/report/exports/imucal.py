@@ -1,6 +1,7 @@
 """imucal's JSON, version 2.0.0, of a turntable calibration: the only format that contains all corrections.
 
-imucal (2.6, ferraris_calibration_info.py): a = R_a⁻¹ K_a⁻¹ (m_a − b_a), ω = R_g⁻¹ K_g⁻¹ (m_g − K_ga a − b_g).
+imucal (2.6, ferraris_calibration_info.py): a = R_a⁻¹ K_a⁻¹ (m_a − b_a), ω = R_g⁻¹ K_g⁻¹ (m_g − K_ga a − b_g), with
+specific force a, rate ω, readings m, scale factors K on the diagonal, axes R, biases b, and g-sensitivity K_ga.
 """
 
 import json
@@ -14,7 +15,7 @@ FORMAT_VERSION = "2.0.0"
 
 
 def imucal_files(calibrations: ExportedCalibrations) -> Mapping[str, str]:
-    """Return one file for each IMU. Raise Refused `nothing_to_export` if there is none."""
+    """Return a text for each IMU, by its file's name. Raise Refused `nothing_to_export` if there is none."""
     documents = {imu.name: _document(calibrations, imu) for imu in calibrations.imus}
     return {f"{name}_imucal.json": json.dumps(document, indent=2) + "\n" for name, document in documents.items()}
 

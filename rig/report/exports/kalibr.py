@@ -1,7 +1,8 @@
 """Kalibr's YAML: noise for its option --imu, and intrinsics in the form of its results.
 
-Kalibr (IccSensors.py, "scale-misalignment"): m_a = M_a a + b_a, m_g = M_g C_g ω + A_g C_g a + b_g with lower triangular
-M, in the frame of the accelerometer's axes, or, without an accelerometer, of the gyroscope's axes.
+Kalibr (IccSensors.py, "scale-misalignment"): m_a = M_a a + b_a, m_g = M_g C_g ω + A_g C_g a + b_g, with readings m,
+specific force a, rate ω, biases b, lower triangular M, rotation C_g, and g-sensitivity A_g. The frame is that of the
+accelerometer's axes or, without an accelerometer, of the gyroscope's axes.
 """
 
 from collections.abc import Mapping
@@ -15,7 +16,9 @@ from rig.report.exports.exported_corrections import ExportedCalibrations, Imu
 
 
 def kalibr_files(calibrations: ExportedCalibrations) -> Mapping[str, str]:
-    """Return `…_imu.yaml` (noise) and `…_intrinsics.yaml` of each IMU. Raise Refused `nothing_to_export`."""
+    """Return the texts of `…_imu.yaml` (noise) and `…_intrinsics.yaml` for each IMU, by file name.
+
+    Raise Refused `nothing_to_export`."""
     files = {}
     names = plain_names(imu.name for imu in calibrations.imus)
     for imu in calibrations.imus:
@@ -33,7 +36,7 @@ def triangular(matrix: Array) -> tuple[Array, Array]:
 
 
 def _noise(calibrations: ExportedCalibrations, imu: Imu, topic: str) -> str:
-    """Return Kalibr's noise file: densities of white noise, and what the run did not measure."""
+    """Return the text of Kalibr's noise file: densities of white noise, and comments that name unmeasured values."""
     rates, forces = imu.gyroscope, imu.accelerometer
     parameters = {
         "rostopic": topic,
@@ -52,7 +55,7 @@ def _noise(calibrations: ExportedCalibrations, imu: Imu, topic: str) -> str:
 
 
 def _intrinsics(calibrations: ExportedCalibrations, imu: Imu, topic: str) -> str:
-    """Return Kalibr's intrinsics: triangular matrices in the frame of the accelerometer, with comments."""
+    """Return the text of Kalibr's intrinsics: triangular matrices in the frame of the accelerometer, with comments."""
     rates, forces = imu.gyroscope, imu.accelerometer
     intrinsics: dict[str, object] = {"model": "scale-misalignment", "rostopic": topic}
     to_body = np.eye(3)

@@ -1,4 +1,4 @@
-"""Temperature corrections of PX4 and ArduPilot: offsets of gyroscopes and accelerometers, to the third power.
+"""Temperature corrections of PX4 and ArduPilot: offsets of gyroscopes and accelerometers as cubic polynomials.
 
 PX4 (temperature_compensation, sensor_calibration): data − (X0 + X1 d + X2 d² + X3 d³) − offset, d = T − TREF, T limited
 to TMIN … TMAX. The offset at TREF is that of CAL_…, so X0 is 0.
@@ -65,7 +65,7 @@ def ardupilot_parameters(polynomials: Polynomials, numbers: Mapping[str, int]) -
 
 
 def _about_35(quantity: str, entry: OverTemperatureEntry) -> tuple[tuple[float, ...], ...]:
-    """Return the coefficients of orders 1 to 3 about ArduPilot's reference of 35 °C, in its unit."""
+    """Return the coefficients of each power 1 to 3, axis by axis, about ArduPilot's 35 °C and in ArduPilot's unit."""
     shift_k = ARDUPILOT_REFERENCE_C - entry.reference_c
     orders = [offset_of(quantity, entry, order) for order in range(4)]
     return tuple(

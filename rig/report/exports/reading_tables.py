@@ -53,7 +53,7 @@ def write_parquet(recordings: Sequence[Exported], folder: Path) -> list[Path]:
 
 
 def write_mat(recordings: Sequence[Exported], folder: Path) -> list[Path]:
-    """Write `run.mat`: a struct for each table, of its columns (n, 1) and its meaning `convention`."""
+    """Write `run.mat`: a struct for each table, with its columns (n, 1) and, as `convention`, its meaning."""
     from scipy.io import savemat
 
     tables = tuple(tables_of(recordings))

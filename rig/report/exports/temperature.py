@@ -37,7 +37,10 @@ def move_to_temperature(
 
 
 def _change(drift: ResultDocument, sensor: SensorCorrection, to_c: float) -> Array:
-    """Return the bias' change (3,) up to `to_c`. Raise Refused `temperature_slope_unknown`, `temperature_outside`."""
+    """Return the bias' change (3,) from the sensor's calibration to `to_c`.
+
+    Raise Refused `temperature_slope_unknown`, `temperature_outside`.
+    """
     name, quantity, from_c = sensor.sensor, sensor.quantity.name, sensor.temperature_c
     if from_c is None:
         raise Refused(

@@ -57,7 +57,10 @@ def document(sensors: Mapping[str, SensorAtRest]) -> dict[str, Any]:
 
 
 def draw_at_rest(sensors: Mapping[str, SensorAtRest], folder: Path) -> list[Path]:
-    """Draw `allan_<sensor>` as PNG and SVG into `folder`, for each sensor with a curve. This needs matplotlib."""
+    """Draw `allan_<sensor>` as PNG and SVG into `folder`, for each sensor with a curve, and return the paths.
+
+    This needs matplotlib.
+    """
     from matplotlib.figure import Figure
 
     written = list[Path]()

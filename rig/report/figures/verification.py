@@ -37,7 +37,10 @@ class Picture:
 
 
 def write_pictures(pictures: Sequence[Picture], folder: Path) -> tuple[RunEvent, ...]:
-    """Draw each picture as PNG and SVG into `folder`; return the event. Draw nothing without matplotlib."""
+    """Draw each picture as PNG and SVG into `folder`, and return the event of the pictures drawn.
+
+    Without matplotlib draw nothing, and return the event that says so.
+    """
     if not pictures:
         return ()
     try:
@@ -113,7 +116,7 @@ def draw_comparison(figure: "Figure", comparison: Comparison, sensor: str, refer
 
 
 def envelope(time_s: Array, values: Array) -> tuple[Array, Array]:
-    """Return the lowest and highest value of a curve (n,) in each column of the panel, which suffice to draw it."""
+    """Return times and values of a long curve (n,) reduced to the lowest and highest value in each column of pixels."""
     if len(values) <= 2 * PIXEL_COLUMNS:
         return time_s, values
     starts = np.linspace(0, len(values), PIXEL_COLUMNS, endpoint=False).astype(np.intp)

@@ -100,7 +100,7 @@ class Term:
 
     @property
     def whose(self) -> str:
-        """The label of the sensor's readings that distinguishes them from its other quantities."""
+        """The label of the sensor's readings, which distinguishes their quantity from the sensor's other quantities."""
         return self.finding.quantity.label(self.finding.sensor)
 
     @property

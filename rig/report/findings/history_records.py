@@ -1,7 +1,8 @@
 """The parameters of a result that a history stores, with their uncertainties, by sensor. Pure.
 
-Names: kx ky kz scale factors, k their mean, bx by bz biases; `characteristics.py` names the others. The mean has a row
-of its own because an error of the clock, a gyroscope's only standard, changes all scale factors by the same fraction.
+The parameters kx, ky, kz are scale factors, k is their mean, and bx, by, bz are biases; `characteristics.py` names the
+others. The mean is a parameter of its own, because an error of the clock, a gyroscope's only standard, changes all
+scale factors by the same fraction.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -61,9 +62,9 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class HistoryRecord:
-    """The parameters of one sensor's result in a run, under the name of a `quantity`.
+    """The parameters, including characteristics, of one sensor's result in a run, for the measured `quantity`.
 
-    `full_scale`: in the unit of its biases, 0 if the result does not state it. Characteristics join `parameters`.
+    `full_scale`: the sensor's range in the unit of its biases, 0 if the result does not state the range.
     """
 
     sensor: str

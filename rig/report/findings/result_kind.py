@@ -26,7 +26,7 @@ OWN_TEMPLATES = Path(__file__).parents[1] / "certificate" / "templates"
 
 @dataclass(frozen=True, slots=True)
 class NoOutlet:
-    """The reason why a kind of result does not have an outlet."""
+    """The reason `why` a kind of result does not have an outlet."""
 
     why: str
 
@@ -48,9 +48,9 @@ class DisplayRow:
     - numbers: the values with U.
     - combined: whether U includes all contributors; otherwise it is two standard deviations of the noise.
     - scale: the scale factors with U.
-    - held_at: the conditions of validity at the end of a run ("at ±60.0 °/s").
-    - model: the model of correction or reading ("g = K (m + b)"); the end of a run shows only its first equation.
-    - noun: the name of numbers without scale factors.
+    - held_at: the conditions under which the values are valid, as the end of a run prints them ("at ±60.0 °/s").
+    - model: the model of correction or reading ("g = K (m + b)"); the end of a run prints only its first equation.
+    - noun: the name of `numbers`, such as "bias".
     - labels: the labels of the numbers.
     """
 

@@ -26,9 +26,10 @@ MINUS_MEAN = "minus its mean"
 
 @dataclass(frozen=True, slots=True)
 class Unexplained:
-    """Residuals of N means, by their `labels`: `values` (N, 3) and standard deviations `stds` (N, 3), in SI units.
+    """Residuals `values` (N, 3) of N mean readings, and their standard deviations `stds` (N, 3), in SI units.
 
-    `shown` and `expectation` are texts on the values and on the standard deviations; rests begin at `split`.
+    `labels` name the means. `shown` and `expectation` are texts on the values and on the standard deviations. The rests
+    of a gyroscope begin at index `split`.
     """
 
     quantity: Quantity

@@ -219,7 +219,7 @@ def _attitude_lines(attitudes: AttitudesEntry | None, clocks: Iterable[TimeBaseE
 
 
 def _speeds(sensor: GyroscopeEntry) -> Iterator[str]:
-    """Yield the speeds for which the calibration is valid; one speed does not show nonlinearity."""
+    """Yield lines on the speeds for which the calibration is valid, and on nonlinearity if several speeds show it."""
     speeds, loads, nonlinearity = speed_words(sensor), load_words(sensor), sensor.nonlinearity
     if loads is not None:
         yield f"rates along its own axes: {loads} °/s"
@@ -235,7 +235,7 @@ def _speeds(sensor: GyroscopeEntry) -> Iterator[str]:
 
 
 def _board_lines(board: BoardEntry) -> Iterator[str]:
-    """Yield the board's solution, or why it has none."""
+    """Yield lines on the board's own solution, or the reason why it has none."""
     solution = board.solutions.get("closed_form")
     if solution is None:
         yield "on the board: nothing was solved"

@@ -29,7 +29,7 @@ from rig.report.tables.budget import budget_table, heading_for
 
 @dataclass(frozen=True, slots=True)
 class Words:
-    """The texts of a kind of three-axis sensor, by its entry.
+    """The texts of a kind of three-axis sensor; the functions build them from a finding or its entry.
 
     The terminal prints `title` behind the sensor's name, the `model` of its readings, and `lines` below the table. The
     digital certificate has scale and bias (`digital`, including a reversal if the run has one) and `temperatures_c`.
@@ -107,7 +107,7 @@ def attitude_lines(finding: Finding[Any]) -> Iterator[str]:
 
 
 def method_lines(entry: Any, quantity: Quantity, from_what: str = "") -> Iterator[str]:
-    """Yield the solutions by the other methods, or why a method has none."""
+    """Yield a line for each other method: its solution, or the reason why it has none."""
     for method, other in entry.other_methods.items():
         if isinstance(other, ErrorEntry):
             yield f"{method}{from_what}: {other.error}"

@@ -19,8 +19,9 @@ def find_uncovered_in_container(der: bytes) -> Iterator[str]:
     """Yield the parts of a signature's container that the signature does not cover.
 
     `der` is the ContentInfo of a document's signature, which covers its signed attributes only. A container is rebuilt
-    from these attributes, the signature's value, the certificates of the signer's chain, and at most one time stamp of
-    the same kind. The original must equal it byte by byte. Whether the certificates are genuine is not tested.
+    from these attributes, the signature's value, the certificates of the signer's chain, and at most one time stamp,
+    which is tested likewise. The original must equal the rebuilt container byte by byte. Whether the certificates are
+    genuine is not tested.
     """
     content = cms.ContentInfo.load(der, strict=True)
     (info,) = content["content"]["signer_infos"]

@@ -41,7 +41,10 @@ class Authorities:
 
 
 def read_authorities(files: Sequence[Path]) -> Authorities:
-    """Return certificates and revocation lists: PEM, or DER for a single list. Raise Refused `revocation_list`."""
+    """Return the certificates and revocation lists in these files. Raise Refused `revocation_list`.
+
+    A file is PEM, or DER if it contains a single revocation list.
+    """
     from cryptography.hazmat.primitives.serialization import Encoding
     from cryptography.x509 import load_der_x509_crl, load_pem_x509_certificates, load_pem_x509_crl
 

@@ -51,7 +51,10 @@ def inspect_pdf(name: str, content: bytes, trust: Trust) -> FileInspection:
 
 
 def _status(signature: Any, trust: Trust) -> Any:
-    """Return pyHanko's status of a signature, trusting as signers only the time servers of `trust`."""
+    """Return pyHanko's status of a signature, with trust in the time servers of `trust` but in no signer.
+
+    `why_untrusted` judges the signer.
+    """
     no_signers = ValidationContext(trust_roots=[], allow_fetching=False)
     roots = list(map(Certificate.load, trust.certificates))
     servers = ValidationContext(trust_roots=roots, allow_fetching=False)

@@ -1,4 +1,4 @@
-"""The signing key with its certificates, from a file (PKCS#12, PEM) or in a PKCS#11 token. The extra `sign`."""
+"""The signing key with its certificates, from a file (PKCS#12, PEM) or in a PKCS#11 token. Needs the extra `sign`."""
 
 import asyncio
 import os
@@ -102,7 +102,7 @@ def _open_file(file: Path) -> Iterator[Signatory]:
 
 
 def _order_chain(certificates: "Sequence[Certificate]", key: Any) -> "list[Certificate]":
-    """Return the certificates, the key's own first, then those of its issuers; empty if the key's own is missing."""
+    """Return the key's own certificate, then those of its issuers; an empty list if the key's own is missing."""
     matching = [one for one in certificates if key is not None and one.public_key() == key.public_key()]
     return chain_of([matching[0], *certificates]) if matching else []
 

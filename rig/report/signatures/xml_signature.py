@@ -76,7 +76,7 @@ def _is_one_certificate(root: Any) -> bool:
 
 
 def _inspect(name: str, chain: Sequence[Certificate], properties: Any, trust: Trust) -> tuple[SignatureReport, Any]:
-    """Return the signature, and the problem of its signer, if any."""
+    """Return the signature's report, and a tuple with the problem of its signer, if any."""
     time = properties.findtext(".//xades:SigningTime", None, NAMES)
     der = [certificate.public_bytes(Encoding.DER) for certificate in chain]
     why = why_untrusted(der, trust, datetime.now(UTC)) if trust.certificates else ""

@@ -75,7 +75,10 @@ def _describe_table(path: Path, layout: TableLayout, guess: LogColumns) -> Itera
 
 
 def describe_convention(convention: Convention | None, *, is_order_named: bool) -> Iterator[str]:
-    """Yield the quaternions' convention, which the gyroscope shows, and the order of their numbers unless named."""
+    """Yield lines on the quaternions' direction, reference and clock, as a comparison with the gyroscope shows.
+
+    The order of the four numbers is included unless the log names it (`is_order_named`).
+    """
     if convention is None or convention.inverse is None:
         what = "the gyroscope does not show the direction of the quaternions"
         why = "the body turned slowly, briefly or about one axis at a time, or they are of another body or clock"
@@ -163,7 +166,7 @@ def _row(name: str, text: str) -> str:
 
 
 def _spell(*entries: Mapping[str, Any]) -> str:
-    """Return the names and the unit of the columns of one quantity."""
+    """Return text that has the names of the columns (`entries`) of one quantity, then their unit."""
     names = " ".join(str(entry["column"]) for entry in entries)
     entry = entries[0]
     unit = str(entry.get("unit", "date and time" if len(entries) == 1 else ""))

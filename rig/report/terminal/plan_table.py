@@ -26,9 +26,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class DryRun:
-    """A plan with its configuration, `repeated` if a verification follows, and predictions computed on demand.
+    """A plan with its configuration, and with predictions that are computed on demand.
 
-    `model`: the turner's model, None if its section does not state it.
+    `model`: the turner's model, None if its section does not state it. `repeated`: whether a verification repeats the
+    movement.
     """
 
     model: str | None

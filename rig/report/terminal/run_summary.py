@@ -155,7 +155,7 @@ def _plus_minus(three: AxisValues) -> list[str]:
 
 
 def _format_axes(three: AxisValues) -> list[str]:
-    """Format the values of three axes, then the largest U."""
+    """Return texts of the values of three axes, then of their largest U."""
     cells = [format_with_u(value, max(three.expanded)) for value in three.values]
     return [*(value for value, _ in cells), cells[0][1]]
 

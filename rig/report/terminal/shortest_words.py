@@ -45,7 +45,7 @@ ASSUMPTIONS = (
 
 
 def list_key_changes(before: ProcedureSection, after: ProcedureSection) -> dict[str, Any]:
-    """Return the changed keys of the procedure with their new values; standard sets of attitudes by name."""
+    """Return the changed keys of the procedure with new values; a standard set of attitudes is given by its name."""
     old, new = _values(before), _values(after)
     return {key: value for key, value in new.items() if old.get(key) != value}
 
@@ -108,7 +108,7 @@ def _plan_entry(planned: PlannedCandidate, section: ProcedureSection) -> dict[st
 
 
 def _sizes_entry(reached: ReachedUncertainty) -> dict[str, float | None]:
-    """Return the uncertainties; null for sensors that are not calibrated."""
+    """Return the reached uncertainties by name; None for sensors that are not calibrated."""
     return {size: getattr(reached, size) or None for size in TARGET_NAMES}
 
 

@@ -38,9 +38,9 @@ def words_of(check: CheckEntry) -> CheckWords | None:
 
 
 def words_of_name(name: str) -> CheckWords | None:
-    """Return the words of a check by its name, with or without sensor, quantity and sweep; None for another name.
+    """Return the words of the check `name`, which may include sensor, quantity and sweep; None if it names no check.
 
-    A sensor may have the name of a check, so the last part that names a check is decisive.
+    Of the parts between points, the last one that names a check is decisive, because a sensor may be called so too.
     """
     prefixes = ["", *(f"{quantity}_" for quantity in _quantities())]
     candidates = (part.removeprefix(prefix) for part in reversed(name.split(".")) for prefix in prefixes)
@@ -48,9 +48,9 @@ def words_of_name(name: str) -> CheckWords | None:
 
 
 def what_failed(check: CheckEntry, folder: Path | None) -> str | None:
-    """Return the meaning and remedy of a failed check, with run folder and limit's key; None for an unknown check.
+    """Return the meaning and remedy of a failed check; they name the run folder and the limit's configuration key.
 
-    If no configuration has this limit, the advice to raise it is left out.
+    The advice to raise the limit is left out if no key configures it. Return None for an unknown check.
     """
     if (words := words_of(check)) is None:
         return None

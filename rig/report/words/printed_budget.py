@@ -20,7 +20,7 @@ STD_DIGITS = 3  # of a combined standard uncertainty: its parts are printed to t
 
 @dataclass(frozen=True, slots=True)
 class BudgetColumn:
-    """The printed uncertainty, in `unit`, of one value: number `index`, from 0, of kx ky kz bx by bz."""
+    """The printed uncertainty of one value in `unit`; the value is at position `index` of (kx, ky, kz, bx, by, bz)."""
 
     index: int
     unit: str
@@ -37,7 +37,7 @@ class BudgetColumn:
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """One contributor: for each column its standard uncertainty and its fraction of the variance."""
+    """One contributor. `parts` has, for each column, its standard uncertainty and its fraction of the variance."""
 
     name: str
     kind: str
@@ -49,14 +49,17 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class PrintedBudget:
-    """The budgets of one scale factor and one bias: of the axes with the largest U, relative for scale factors."""
+    """The budgets of the scale factor with the largest relative U and of the bias with the largest U."""
 
     columns: tuple[BudgetColumn, BudgetColumn]
     lines: tuple[Line, ...]
 
 
 def lay_out_budget(budget: BudgetEntry, scale: Sequence[float], bias: DisplayUnit) -> PrintedBudget:
-    """Return the budget, largest contributions first and negligible ones in one line, with biases in unit `bias`."""
+    """Return the printed budget, in order of decreasing contributions, with the bias in unit `bias`.
+
+    Negligible contributors share the last line.
+    """
     indices = find_printed_indices(budget, scale)
     sizes = [
         _Size.choose(budget.std[indices[0]], 1.0, ""),
@@ -76,7 +79,7 @@ def lay_out_budget(budget: BudgetEntry, scale: Sequence[float], bias: DisplayUni
 
 
 def find_printed_indices(budget: BudgetEntry, scale: Sequence[float]) -> tuple[int, int]:
-    """Return the positions of the printed scale factor and bias in kx ky kz bx by bz."""
+    """Return the positions of the printed scale factor and bias in (kx, ky, kz, bx, by, bz)."""
     return int(np.argmax(np.divide(budget.expanded[:3], scale))), 3 + int(np.argmax(budget.expanded[3:]))
 
 
