@@ -106,7 +106,10 @@ def add_history(parser: argparse._ActionsContainer) -> None:
 
 
 def read_history_name(name_or_file: str | None) -> str | None:
-    """Return a history's file or URL, read from a named configuration; None without a name. Raise Refused as `load`."""
+    """Return a history's file or URL as named, or as configured in a named YAML file; None without a name.
+
+    Raise Refused as `load` does.
+    """
     if name_or_file is None or not name_or_file.endswith((".yaml", ".yml")):
         return name_or_file
     from rig.config.load import load

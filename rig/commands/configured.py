@@ -56,7 +56,7 @@ def change_configured(configured: Configured, overrides: Sequence[str]) -> Confi
 def open_configured(
     config_path: Path, overrides: Sequence[str] = (), script: ScriptFile | Path | None = None
 ) -> Iterator[Configured]:
-    """Load as `load_configured` does; a simulated laboratory has an address of its own during the block."""
+    """Load and yield as `load_configured` does; during the block a simulated laboratory has its own address."""
     configured = load_configured(config_path, overrides, script)
     with find_own_address(configured.loaded.config, configured.loaded.laboratory) as moved:
         yield load_configured(config_path, [*overrides, *moved], script and configured.script) if moved else configured

@@ -83,7 +83,7 @@ class ArmMotionSource:
 
     @property
     def ideal(self) -> bool:
-        """Whether `rate_at` gives all that a gyroscope senses: no errors, and ground that does not rotate."""
+        """Whether `rate_at` gives all that a gyroscope senses: an arm without errors on ground that does not rotate."""
         return self.arm.ideal
 
     def step(self) -> None:

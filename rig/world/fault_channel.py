@@ -31,7 +31,7 @@ A request is `{"do": NAME, …}`; the reply is one line, `{"ok": true, "time_s":
     printer_fault sensor bit_error_rate lose stuck silent stolen host_baud
                                                 faults of a device that prints lines; each keeps its value likewise
     printer_power sensor on
-    air temperature_c                           sets the air around the board from now on; needs a section `thermal`
+    air temperature_c                           sets the board's air temperature from now on; needs a section `thermal`
     heater                                      reports the duty cycle of the heater's pin and the board's temperature
     mount stage                                 mounts the item as in `world.mounts` for that stage, counted from 0
     fit part                                    fits the board of another part of a series, by its serial number

@@ -154,7 +154,7 @@ class Laboratory:
         self.sense()
 
     def turn(self) -> None:
-        """Simulate one tick of the motion; several may precede one `sense` while the source is `waiting`."""
+        """Simulate one tick of the motion. While the source is `waiting`, several ticks may precede one `sense`."""
         self.motion_source.step()
 
     def sense(self) -> None:

@@ -1,7 +1,8 @@
 """The simulated magnetic field: flux density as a function of position and time, in the axes of the arm's base.
 
-The field of the Earth and the room is smooth: uniform, a gradient that no current within the room causes (∇·B = 0 and
-∇×B = 0, so five numbers), and a steady drift. The arm's iron is modelled as dipoles fixed to its links.
+The field of the Earth and the room is smooth. It is the sum of a uniform field, a gradient without currents in the room
+(∇·B = 0 and ∇×B = 0, so five numbers determine it), and a steady drift. The arm's iron is modelled as dipoles fixed to
+its links.
 """
 
 from collections.abc import Sequence
@@ -47,7 +48,7 @@ class Dipole:
     moment_a_m2: Vector
 
     def flux_density_at(self, position_m: Vector, frames: Frames) -> Vector:
-        """Return the iron's flux density, T, at a position in the base frame, m; below 1 mm as at 1 mm."""
+        """Return the iron's flux density, T, at a position in the base frame, m; distances below 1 mm count as 1 mm."""
         rotation, origin = frames[self.carried_by]
         source, moment = rotate(rotation, self.position_m), rotate(rotation, self.moment_a_m2)
         x, y, z = (target - base - offset for target, base, offset in zip(position_m, origin, source, strict=True))

@@ -29,7 +29,7 @@ class MotionSource(Protocol):
 
     @property
     def ideal(self) -> bool:
-        """Whether `rate_at` gives all that a gyroscope senses: no errors, and ground that does not rotate."""
+        """Whether `rate_at` gives all that a gyroscope senses: a turner without errors on still ground."""
         ...
 
     def step(self) -> None:
@@ -37,7 +37,7 @@ class MotionSource(Protocol):
         ...
 
     def rate_at(self, time_s: float) -> Components:
-        """Return the angular rate, rad/s, of the body with the sensors, in its own frame. Only for `ideal` sources."""
+        """Return the angular rate, rad/s, of the body with the sensors, in its own frame; valid only if `ideal`."""
         ...
 
     def motion_at(self, time_s: float) -> BodyMotion:

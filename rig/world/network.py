@@ -98,7 +98,10 @@ class ClientConnection:
         self.due = (b"" if self.listener.silent else self.due) + self.session.tick()
 
     def deliver(self, idle: bool, patient: bool) -> float:
-        """Send the bytes of past ticks. Return the time to wait, s, if a client lags too far and `patient` is set."""
+        """Send the bytes of past ticks, unless `patient` is set and the client lags too far.
+
+        Return the wall time to wait for the client, s; 0 if it does not lag too far, or without patience.
+        """
         if self.listener.silent:
             return 0.0
         if self.listener.gathers and not idle and time.monotonic() - self._delivered_s < GATHER_S:

@@ -67,7 +67,8 @@ class SimulatedOperator:
     def instruct(self, say: str, face: Face, turns: int = 0, *, again: bool = False) -> None:
         """Replace the pending instruction.
 
-        Raise ValueError for an unknown one. An item that already lies as requested is left alone, unless `again`.
+        Raise ValueError for an unknown instruction. An item that already lies as requested is left alone, unless
+        `again`.
         """
         if face not in FACES or say not in ("lay", "turn"):
             raise ValueError(f"there is no instruction {say!r} of a side {face!r}")

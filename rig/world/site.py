@@ -29,7 +29,10 @@ def build_site(section: WorldSiteSection) -> SiteTruth:
 
 
 def rotate_into_base(section: WorldSiteSection, *, north: float = 0.0, west: float = 0.0, up: float = 0.0) -> Vector:
-    """Return a vector in the base's axes: rotated clockwise by the heading, then tilted about x and the new y axis."""
+    """Return the vector with components `north`, `west` and `up` in the axes of the arm's base.
+
+    The base has a heading, clockwise from north, and is tilted about x, then about the new y axis.
+    """
     heading = radians(section.heading_deg)
     about_x, about_y = (radians(angle) for angle in section.base_tilt_deg)
     x, y, z = north * cos(heading) - west * sin(heading), north * sin(heading) + west * cos(heading), up

@@ -55,7 +55,7 @@ SCRIPT_PORTS = (script_socket.PRIMARY_PORT, script_socket.SECONDARY_PORT, script
 
 
 class World:
-    """Laboratory, clock and sockets."""
+    """The simulated laboratory with its clock, and the sockets at which clients reach its devices."""
 
     def __init__(self, loaded: Loaded, truth_file: Path | None = None) -> None:
         """Open all ports. The world may write its truth into `truth_file`, if given."""

@@ -68,9 +68,9 @@ def write_documents(options: Namespace) -> tuple[list[Path], list[Refused]]:
     """Write the certificate of a run folder or its result.json into `--out`: HTML, and XML and PDF on request.
 
     `--sign` is the key that signs XML and PDF, `--time-server` the server that dates the signature. `--reversal` is the
-    file by `rig reversal` for its magnetometers. `--history` is the history in which the certificate is entered, by
-    default the user's own, never one that the folder names. Return the files, and why requested forms could not be
-    made. Raise Refused `report_folder`, `bad_option`, and what `read_result`, `read_reversal`, `refuse_links`,
+    file that `rig reversal` wrote for the run's magnetometers. `--history` is the history in which the certificate is
+    entered, by default the user's own, never one that the folder names. Return the files, and why requested forms could
+    not be made. Raise Refused `report_folder`, `bad_option`, and what `read_result`, `read_reversal`, `refuse_links`,
     `certificate_of`, `folder_statements` and `signatory` raise.
     """
     if options.sign is None and options.time_server is not None:
@@ -140,7 +140,7 @@ def _write_signed(options: Namespace, by: "Signatory | None") -> tuple[list[Path
 def _make_digital(
     certificate: "Certificate", by: "Signatory | None", reason: "Reason", left_out: list[Refused] | None
 ) -> dict[str, bytes]:
-    """Return the digital certificate by name, signed if there is a signatory; empty if it cannot be made.
+    """Return the digital certificate by its file name, signed if there is a signatory; empty if it cannot be made.
 
     The reason is appended to `left_out`, or printed if that is None.
     """

@@ -256,7 +256,10 @@ def _select_pasts(history: History, selection: Selection) -> list[Past]:
 
 
 def _find_run_folders(folders: list[Path], *, unsolved: bool) -> Iterator[Path]:
-    """Yield the run folders among and within `folders`, and any folder without a run, which is then refused by name."""
+    """Yield the run folders among and within `folders`; with `unsolved`, also those without a result.
+
+    A folder without any run is yielded too, so that it is refused by name.
+    """
     for folder in folders:
         inner = {file.parent for file in folder.rglob(RESULT)}
         if unsolved:
@@ -267,8 +270,8 @@ def _find_run_folders(folders: list[Path], *, unsolved: bool) -> Iterator[Path]:
 def _recompute_finished(folder: Path, history: History, *, solve: bool) -> FinishedRun:
     """Return the run with its result recomputed from its recordings, unless the history already has it.
 
-    A result.json alone proves nothing. Raise Refused `no_recording`, `result_not_of_recording`, and as the recordings'
-    solution does.
+    A result.json alone proves nothing, so it must agree with the recordings; with `solve` it is replaced if it does
+    not. Raise Refused `no_recording`, `result_not_of_recording`, and the errors of the recordings' solution.
     """
     claimed = None if solve and not (folder / RESULT).exists() else read_finished_run(folder)
     if claimed is not None:

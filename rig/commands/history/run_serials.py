@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def recall_sensors(config: RigConfig, moved: frozenset[str]) -> Memory:
-    """Return earlier calibrations of the sensors of `config`; if the history does not answer, only the reason.
+    """Return earlier calibrations of the sensors of `config`, or the reason why the history does not give any.
 
     `moved` are serial numbers of sensors that are declared to be on another board than before.
     """

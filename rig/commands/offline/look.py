@@ -114,7 +114,7 @@ def _print(
 
 
 def _names_order(reference: "LookedFile") -> bool:
-    """Return whether the file's headings identify the four numbers of the quaternion."""
+    """Return whether the file names the four numbers of the quaternion, by headings or by its format."""
     from rig.data.recording.motion_file import QUATERNION
 
     headings = () if reference.layout is None else reference.layout.headings

@@ -129,7 +129,7 @@ def refuse_for_recording(options: Namespace) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Solve the two files and print the result; with `--out` also write a run folder and enter it in the history.
+    """Solve the readings and print the result; with `--out` also write a run folder and enter it in the history.
 
     Return 0, or 1 if a check failed. Raise Refused `bad_option`, `run_folder`, and what `build_recording` and the
     solution raise.

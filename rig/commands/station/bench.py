@@ -44,7 +44,7 @@ from rig.turners.turner_registry import kind_of
 
 @dataclass(slots=True)
 class PartListener:
-    """A listener of one run: notes the board, whether anything was recorded, whether refused sweeps can be repeated."""
+    """A listener of one run, which notes the board, whether readings were recorded and whether to repeat sweeps."""
 
     chip: Chip | None = None
     recorded: bool = False
@@ -256,7 +256,7 @@ def refuse_other_sensors(config: RigConfig) -> None:
 
 
 def _read_ended(folder: Path, configured: Configured) -> PartEnded | None:
-    """Enter a run that ended before the station was killed; return its result, None if sweeps must be repeated."""
+    """Enter in the history a run that ended before the station was killed; return its end, or None to repeat sweeps."""
     result = read_result(folder)
     failed = [check for check in result.checks if not check.passed]
     if any(check.means.sweep is not None for check in failed):

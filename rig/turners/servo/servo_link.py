@@ -157,7 +157,7 @@ class ServoLink:
             self._fail(hardware_problem(self._error_bits))
 
     def _fresh(self, state: ServoState) -> bool:
-        """Return whether the servo's own clock shows that a reply is current."""
+        """Return whether a reply is current by the servo's own clock, or is the latest of many after a restart."""
         before = self._latest
         if state.took_s > MAX_TRANSACTION_S:
             return False
@@ -166,6 +166,7 @@ class ServoLink:
         since_s = state.time_s - before.time_s
         counted_s = 1e-3 * ((state.tick - before.tick) % TICKS)
         wrap_s = 1e-3 * TICKS
+        # The servo's counter, modulo its range, must have advanced by the time between the replies.
         unlike_s = abs((counted_s - since_s + wrap_s / 2) % wrap_s - wrap_s / 2)
         if unlike_s < TICK_S + TICK_FRACTION * since_s + state.took_s + before.took_s:
             self._unlike = 0

@@ -153,7 +153,7 @@ def _load(report: ServoReport, carried: FlangeLoad) -> list[Problem]:
 
 
 def hardware_problem(bits: int) -> Problem:
-    """Return the problem by the most serious bit of a hardware error."""
+    """Return the problem that the most serious bit of a hardware error shows."""
     what = f"the servo reports {error_words(bits)}"
     if bits & OVERLOAD_ERROR:
         remedy = "Find what blocked the shaft; hold the board, and switch the servo off and on"

@@ -139,7 +139,7 @@ def program_interruption(state: ArmState) -> Problem | None:
 
 
 def _safety_problem(state: ArmState) -> Problem | None:
-    """Return the problem of a safety mode other than normal, by the mode or the safety bits."""
+    """Return the problem of a safety mode other than normal, as the mode or the safety bits show it."""
     mode = state.safety_mode
     if mode == SafetyMode.NORMAL:
         mode = next((bit_mode for bit, bit_mode in _SAFETY_BITS.items() if state.safety_status_bits >> bit & 1), mode)

@@ -47,7 +47,7 @@ def _position_problems(motion: Motion, ours: JointLimits, theirs: JointLimits | 
 
 
 def _describe_remedy(motion: Motion, joint: int, within_rad: tuple[float, float]) -> str:
-    """Return the remedy for a motion beyond a joint's range, by the motion's start and kind."""
+    """Return the remedy for a motion beyond a joint's range, which depends on the motion's start and kind."""
     name, (low, high) = JOINT_NAMES[joint], within_rad
     if not low <= motion.start_q_rad[joint] <= high and not isinstance(motion, Sweep):
         return f"Bring {name} back inside its range from the pendant, or correct arm.home_deg"
@@ -98,12 +98,12 @@ def _find_excess(values: Array, ours: Joints, theirs: Joints | None) -> Iterator
 
 
 def _fractions(motion: Motion) -> Array:
-    """Return the travel (6,) of each joint relative to the longest travel; speeds have the same ratios."""
+    """Return each joint's travel divided by the longest travel, (6,); the joints' speeds have the same ratios."""
     travel_rad = np.abs(travel(motion.start_q_rad, motion.target_q_rad))
     fractions: Array = travel_rad / travel_rad.max()
     return fractions
 
 
 def _narrower(ours: float, theirs: float | None) -> tuple[float, str]:
-    """Return the narrower of the model's and the controller's limit, apart from rounding, and its owner."""
+    """Return the narrower limit and its owner, the model (`ours`) or the controller; the model if they nearly agree."""
     return (ours, RIG_LIMIT) if theirs is None or theirs >= ours * (1 - LIMIT_TOLERANCE) else (theirs, CONTROLLER_LIMIT)

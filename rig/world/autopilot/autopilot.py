@@ -37,7 +37,7 @@ SENSORS_UPDATED, TEMPERATURE_UPDATED = 0x3F, 0x1000
 class AutopilotFaults:
     """Faults that a test can set: the fractions of messages `lost` and `doubled`.
 
-    `slowest`: the provided fraction of the requested rate. A `deaf` autopilot ignores all messages.
+    `slowest`: the sent message rate as a fraction of the requested one. A `deaf` autopilot ignores all messages.
     """
 
     lost: float = 0.0
@@ -48,7 +48,7 @@ class AutopilotFaults:
 
 
 class SimulatedAutopilot:
-    """The autopilot, switched on at the virtual time `time_s`, when its clock reads `uptime_s`."""
+    """The simulated autopilot, switched on at the virtual time `time_s`, when its clock reads `uptime_s`."""
 
     def __init__(
         self,

@@ -19,7 +19,7 @@ class HeatedPart:
         self._offset_k = 0.0
 
     def advance(self, body_c: float, heater_w: float, dt_s: float) -> None:
-        """Let the temperature follow the body's for `dt_s`."""
+        """Let the part follow the body's temperature for `dt_s`; the heater's `heater_w` also warms its elements."""
         section = self._section
         self._thermometer_c += (body_c - self._thermometer_c) * _settle(dt_s, section.thermometer_lag_s)
         self._element_c += (self._thermometer_c - self._element_c) * _settle(dt_s, section.element_lag_s)
@@ -41,7 +41,7 @@ class HeatedPart:
 
 
 class HeatedBody:
-    """The board as one body at `temperature_c`, °C. A test may set `air_c`, which overrides the configured air."""
+    """The board as one body at `temperature_c`, °C. A test may set `air_c`, which overrides the air's temperature."""
 
     def __init__(self, section: SimulatedThermalSection) -> None:
         self._section = section

@@ -20,7 +20,7 @@ KNOCK_S = 0.006
 
 @dataclass(frozen=True, slots=True)
 class HandCourse:
-    """Times (n,), rates (n, 3) and specific forces (n, 3) in body axes, attitudes (n, 3, 3) body to room."""
+    """Times (n,), with rates and specific forces (n, 3) in body axes, and attitudes (n, 3, 3) from body to room."""
 
     time_s: Array
     rates: Array

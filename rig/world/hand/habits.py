@@ -54,7 +54,7 @@ class Mistake:
 
 @dataclass(frozen=True, slots=True)
 class FlipAction:
-    """Lay the body on another face, so that its axis `to` points upwards."""
+    """The action of laying the body on another face, so that its axis `to` points upwards."""
 
     to: Face
     mistake: Mistake | None = None
@@ -62,7 +62,7 @@ class FlipAction:
 
 @dataclass(frozen=True, slots=True)
 class TurnAction:
-    """Turn the body on its face by whole `turns` about its upward axis."""
+    """The action of turning the body on its face by whole `turns` about its upward axis."""
 
     turns: int
     mistake: Mistake | None = None
@@ -70,7 +70,7 @@ class TurnAction:
 
 @dataclass(frozen=True, slots=True)
 class WaitAction:
-    """Leave the body alone."""
+    """The action of leaving the body alone for `seconds`."""
 
     seconds: float
     mistake: Mistake | None = None

@@ -26,7 +26,10 @@ VOLTAGE_ERROR, OVERHEATING_ERROR, OVERLOAD_ERROR = 0x01, 0x04, 0x20  # bits of H
 
 @dataclass(slots=True)
 class ServoFaults:
-    """Faults that a test can set: supply, temperature, a blocked shaft, no answers, a refusal of every write."""
+    """Faults that a test can set: the supply's voltage, the temperature, and three conditions.
+
+    `held_fast`: the shaft is blocked. `dumb`: the servo never answers. `denies`: it refuses every write.
+    """
 
     voltage_v: float
     temperature_c: float

@@ -28,7 +28,10 @@ class ReportLevel(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class ErrorReport:
-    """An error that the pendant shows as `C100A7`: code, argument (client library, error_code_texts.h), severity."""
+    """An error of the controller, which the pendant shows as C code A argument, such as `C100A7`.
+
+    The maker's client library lists the codes and arguments (error_code_texts.h); `level` is the severity.
+    """
 
     code: int
     argument: int

@@ -1,9 +1,9 @@
 """The dashboard server, port 29999: one line in, one line out.
 
 Source: the maker's Dashboard Server manual, e-Series. In local control the server answers questions and refuses every
-order, including `stop`. On a connection that was opened in local control it does so until the client opens a new one
-(Universal Robots ROS Driver, issues 125 and 262). A CB3 has neither local control nor operational modes, nor the
-commands about them; it has user roles, which the e-Series lacks (the maker's client library,
+order, including `stop`. A connection that was opened in local control never accepts orders, so the client must open a
+new one (Universal Robots ROS Driver, issues 125 and 262). A CB3 has neither local control nor operational modes, nor
+the commands about them; it has user roles, which the e-Series lacks (the maker's client library,
 `dashboard_client_implementation_g5.cpp`).
 """
 

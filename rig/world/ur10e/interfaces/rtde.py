@@ -68,7 +68,7 @@ class OutputRecipe:
 
 
 class RtdeSession:
-    """The world's side of one connection, with its recipes."""
+    """The world's side of one RTDE connection, with the recipes that the client has set up."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
@@ -85,7 +85,7 @@ class RtdeSession:
 
     @property
     def dialogue(self) -> bool:
-        """Whether the client still asks questions, because after setting up its recipes it only exchanges values."""
+        """Whether the client still asks questions; once it has started the data packages, it only exchanges values."""
         return not self._started
 
     def greeting(self) -> bytes:
@@ -220,7 +220,7 @@ class RtdeSession:
 
 
 def _size_bytes(kinds: list[str]) -> int:
-    """Return the bytes that values of these types take, or those of the list of the types' names if these are more."""
+    """Return the number of bytes of values of these types, or of the list of the types' names if that is larger."""
     return max(struct.calcsize(">" + "".join(TYPES[kind][0] for kind in kinds if kind in TYPES)), len(",".join(kinds)))
 
 

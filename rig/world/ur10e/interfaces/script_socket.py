@@ -2,8 +2,9 @@
 
 Source: the maker's URScript manual. A text is a program once its blocks are closed; a line outside a block is a program
 by itself. The text of `rtde_control` is not interpreted; `ur_rtde_program` simulates it. Other programs may use the
-statements of `urscript`. In local control no program is accepted: a connection opened during it remains read-only, and
-those open at its beginning are closed (Universal Robots ROS Driver, issue 459).
+statements of `urscript`. In local control no program is accepted. Switching to local control closes the open
+connections, and a connection that is opened in local control remains read-only (Universal Robots ROS Driver, issue
+459).
 """
 
 import re

@@ -75,7 +75,7 @@ def solve_joint_speeds(q: Joints, tool_speed: Sequence[float], links: Links = NO
 
 
 def approach_speed(tool_speed: Sequence[float], target: Sequence[float], step: float) -> Sequence[float]:
-    """Return the tool's speed, m/s, after a change by at most `step` towards `target`."""
+    """Return the tool's velocity (6,), m/s and rad/s, after a change by at most `step`, m/s, towards `target`."""
     change = np.array(target) - np.array(tool_speed)
     size = _length(change)
     return target if size <= step else tuple((np.array(tool_speed) + change * (step / size)).tolist())
@@ -86,8 +86,8 @@ def plan_straight_line(
 ) -> Generator[None, None, Trajectory]:
     """Plan a moveL from rest to rest, a few knots per tick so that the world continues during planning.
 
-    If a joint would be too fast, the whole line is slowed down. Raise `OutOfReach` if that makes it slower than
-    `MIN_SPEED_FRACTION`, because the line leads through a singularity, or if the pose is out of reach.
+    If a joint would be too fast, the whole line is slowed down. Raise `OutOfReach` if the pose is out of reach, or if
+    the line would be slowed down below the fraction `MIN_SPEED_FRACTION` of its speed, as near a singularity.
     """
     rotation, position = np.array(rotation_from_vector(pose[3:])), np.array(pose[:3])
     twist = _twist(start, rotation, position, links)

@@ -147,7 +147,7 @@ class JointErrors:
         )
 
     def _hysteresis(self, joint: int, e: float) -> tuple[float, float, float]:
-        """Return the joint's lag, rad, and its first two derivatives with respect to the encoder's angle."""
+        """Return the joint's lag due to friction, rad, and its two derivatives with respect to the encoder's angle."""
         reversal_rad, lag = self._reversal[joint]
         end = 0.5 * self._errors.hysteresis_rad * self._direction[joint]
         excess = (lag - end) * exp(-abs(e - reversal_rad) / REVERSAL_RAD)

@@ -14,7 +14,7 @@ SOFT_STEPS, SOFT_STEP_S, SOFT_OVERSHOOT = 19, 0.008, 1.38  # the gentle start of
 class MotionSegment:
     """A segment that starts at angles `q_rad` with speeds `qd_rad_s` and keeps the accelerations `qdd_rad_s2`.
 
-    Each has a value for each of six joints.
+    Angles, speeds and accelerations have a value for each of the six joints.
     """
 
     duration_s: float
