@@ -255,7 +255,7 @@ def _no_room(path: Path, why: str) -> Refused:
 
 
 def _parts(out: Any) -> Iterator[Part]:
-    """Yield the process' output: a line of JSON, or an array in NumPy's format, one after the other."""
+    """Yield the parts in the process' output; each is a line of JSON or an array in NumPy's format."""
     import numpy as np
 
     while start := out.read(1):

@@ -22,7 +22,7 @@ class HandAsked:
 
 @dataclass(frozen=True, slots=True)
 class HandRested:
-    """The item lay at rest with the side `face` up."""
+    """A rest of the item with the side `face` up."""
 
     begin_us: Microseconds
     end_us: Microseconds

@@ -109,7 +109,7 @@ def provenance_of_files(readings: FileEntry, motion: FileEntry | None, item: Ite
 
 
 def _program() -> dict[str, Any]:
-    """Return the versions of the program."""
+    """Return the versions of the rig, of Python and of the packages, as fields of a `Provenance`."""
     return {
         "rig_version": VERSION,
         "python_version": platform.python_version(),

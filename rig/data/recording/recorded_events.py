@@ -29,38 +29,38 @@ LIMIT = 1e6  # of a sweep's or dwell's numbers in SI units: ten days, and more t
 
 @dataclass(frozen=True, slots=True)
 class SweepStarted:
-    """The arm was commanded to make a sweep."""
+    """The command to the arm to make a sweep."""
 
     sweep: Sweep
 
 
 @dataclass(frozen=True, slots=True)
 class SweepFinished:
-    """The arm has made the sweep."""
+    """The end of a sweep that the arm has made."""
 
     sweep: Sweep
 
 
 @dataclass(frozen=True, slots=True)
 class RestStarted:
-    """The arm has come to rest."""
+    """The beginning of a rest of the arm."""
 
 
 @dataclass(frozen=True, slots=True)
 class RestFinished:
-    """The arm was at rest until this time."""
+    """The end of a rest of the arm."""
 
 
 @dataclass(frozen=True, slots=True)
 class DwellStarted:
-    """The arm is at rest in an attitude, and the sensors have settled: the dwell's measurement begins."""
+    """The beginning of a dwell's measurement, when the arm rests in an attitude and the sensors have settled."""
 
     dwell: Dwell
 
 
 @dataclass(frozen=True, slots=True)
 class DwellFinished:
-    """A dwell has been measured."""
+    """The end of a dwell's measurement."""
 
     dwell: Dwell
 

@@ -26,9 +26,9 @@ class TemperatureWanted:
 
 @dataclass(frozen=True, slots=True)
 class SetMeasured:
-    """The end of a set, in the warming or the cooling direction.
+    """The end of the sweeps and dwells at one temperature, while the sensors were `warming` or cooling.
 
-    Its sweeps and dwells have the indices from `first` up to, not including, `end`. `temperatures_c` are the mean
+    The sweeps and dwells have the indices from `first` up to, not including, `end`. `temperatures_c` are the mean
     temperatures of the sensors' own thermometers, by sensor name.
     """
 

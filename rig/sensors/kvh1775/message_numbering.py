@@ -61,7 +61,7 @@ class MessageCounter:
         return numbers, times.astype(np.int64)
 
     def _check_times(self, steps: NDArray[np.int64], passed_us: NDArray[np.int64]) -> None:
-        """Raise SensorError if times (µs since the last message) and sequence steps count periods differently."""
+        """Raise SensorError unless the times `passed_us` since the last message agree with the sequence `steps`."""
         by_time = np.rint(passed_us / self.interval_us).astype(np.int64)
         if (by_time > SEQUENCE_NUMBERS).any():
             raise self._ambiguous(f"{int(by_time.max()) - 1} messages are missing in a row")

@@ -46,7 +46,7 @@ def list_angles(layout: TableLayout) -> list[int]:
 
 
 def find_matrices(layout: TableLayout, values: Array) -> list[int]:
-    """Return the columns of rotation matrices: each nine adjacent ones, the elements by rows or by columns."""
+    """Return the columns of rotation matrices; nine adjacent columns are the elements of one, by rows or by columns."""
     numbers, matrices = set(layout.numbers), list[int]()
     for start in layout.numbers:
         indices = [*range(start, start + 9)]
@@ -66,10 +66,11 @@ def _are_rotations(values: Array) -> bool:
 
 
 def find_quaternion(layout: TableLayout, values: Array, matrices: Sequence[int]) -> dict[str, int]:
-    """Return the columns of a quaternion, qw qx qy qz: by their names, or four adjacent columns whose norm is 1.
+    """Return the columns of a quaternion by its components qw qx qy qz; empty if there is none.
 
-    A row of a rotation matrix has this norm too, with any number next to it that is about zero: such columns, and those
-    whose headings say something else, are no quaternion.
+    The columns are found by their names, or else as four adjacent columns whose norm is 1. Columns of rotation matrices
+    are left out, because a matrix row next to a number near zero has this norm too, and so are columns whose headings
+    say something else.
     """
     named: dict[str, int] = {}
     for index in layout.numbers:

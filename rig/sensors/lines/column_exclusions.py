@@ -18,7 +18,7 @@ LEAST_GRAVITY = 0.7  # fraction of 1 g that remains in an accelerometer's median
 
 
 def find_virtual(layout: TableLayout, values: Array, title: str) -> tuple[set[int], list[str]]:
-    """Return the columns that a program computed as gravity or acceleration without it, and a sentence on each kind.
+    """Return the columns that a program computed, as gravity or as acceleration without gravity, and why to omit them.
 
     `title`: the file's name, which counts for columns that are named by their axes alone.
     """
@@ -48,9 +48,9 @@ def _has_gravity(values: Array) -> bool:
 def explain_unread(
     layout: TableLayout, values: Array, used: Collection[int | None], read: Collection[str | int]
 ) -> list[str]:
-    """Return a sentence on each three columns that a sensor's name and its axes name, but that are not `read`.
+    """Return a sentence on each triad of columns that is named like a sensor's axes but not `read`.
 
-    `used`: columns with another meaning.
+    `used`: the columns with another meaning, which are no triads.
     """
     columns: dict[tuple[str, str], list[int]] = {}
     for index in range(len(layout.headings)):

@@ -52,9 +52,9 @@ def simplify_heading(layout: TableLayout, index: int) -> str:
 
 
 def _find_kind(words: Sequence[str], unit: str) -> str:
-    """Return the sensor that a heading's words before the axis name, or "": by the unit, or else by the words.
+    """Return the kind of sensor that a heading's `unit` shows or else its `words` before the axis name; "" if unknown.
 
-    A unit counts more than a word, because fx_uT is a field, no force.
+    The unit decides first, because fx_uT is a field, not a force.
     """
     text = "_".join(words)
     if OTHER_WORDS.search(text):
@@ -66,14 +66,14 @@ def _find_kind(words: Sequence[str], unit: str) -> str:
 
 
 def _divide_axis(words: list[str]) -> list[str]:
-    """Return a heading's words with the axis apart from a short name of a sensor, as in fx_uT."""
+    """Return a heading's words with the axis split off a sensor's short name: fx_uT becomes f, x, uT."""
     match = re.fullmatch(r"(.+)([xyz])", words[0]) if words else None
     is_short = match is not None and match[1] in SHORT_NAMES and UNIT_WORDS.issuperset(words[1:])
     return [match[1], match[2], *words[1:]] if match is not None and is_short else words
 
 
 def _strip_units(words: list[str]) -> list[str]:
-    """Return a heading's words up to the axis, without a unit that follows, as in x_rad_s."""
+    """Return a heading's words up to the axis, without a unit behind it; a bare axis gets the sensor of its unit."""
     axes = [position for position, word in enumerate(words) if word in AXES]
     if axes and axes[-1] < len(words) - 1 and all(word in UNIT_WORDS for word in words[axes[-1] + 1 :]):
         kind = {"rad": "gyro", "deg": "gyro", "dps": "gyro", "m": "acc", "t": "mag", "ut": "mag"}.get(
@@ -95,7 +95,7 @@ def is_axis(name: str) -> bool:
 
 
 def is_nameless(name: str) -> bool:
-    """Return whether a simplified heading says nothing about a quantity: none, a bare axis, or a column's label."""
+    """Return whether a simplified heading says nothing about a quantity: it is empty, a bare axis, or a mere label."""
     return re.fullmatch(LABEL, name.partition(" ")[0]) is not None
 
 

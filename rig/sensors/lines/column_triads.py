@@ -18,8 +18,8 @@ def guess_triads(
 ) -> tuple[Guess, list[list[int]]]:
     """Guess which columns of readings (n, k) at a given rate are triads of sensors, and their units.
 
-    Return the positions of the unnamed triads that remain undetermined too. `indices` (k,) are the columns' numbers in
-    the file; `still` (n,) marks the rows at rest; if it marks none, all rows count as at rest.
+    Return the guess, and the positions of the unnamed triads that remain undetermined. `indices` (k,) are the columns'
+    numbers in the file; `still` (n,) marks the rows at rest; if it marks none, all rows count as at rest.
     """
     count = values.shape[1]
     still = still if still.any() else np.ones(len(values), dtype=np.bool_)
@@ -37,9 +37,11 @@ def guess_triads(
 
 
 def _list_starts(columns: Sequence[str], names: Sequence[str], indices: Sequence[int]) -> list[int]:
-    """Return the positions with which an unnamed triad may begin: x of x y z, or by threes from the first column.
+    """Return the positions at which an unnamed triad may begin.
 
-    A program writes its sensors one after another, so three other adjacent columns are parts of two sensors.
+    Three unnamed columns are a triad if their headings are x y z. Otherwise they must be adjacent, and follow a
+    sensor's column or lie at a multiple of three from the first unnamed column: a program writes its sensors one after
+    another, so other groups of three columns would belong to two sensors.
     """
     first = next((index for index, column in zip(indices, columns, strict=True) if column == UNNAMED), 0)
     starts: list[int] = []
@@ -55,9 +57,10 @@ def _list_starts(columns: Sequence[str], names: Sequence[str], indices: Sequence
 
 
 def _drop_unconfirmed(guess: Guess, named: set[str]) -> None:
-    """Take unnamed triads out of a guess if gravity does not confirm them: its size, or its rotation.
+    """Remove from a guess the unnamed triads that neither the size nor the rotation of gravity confirms.
 
-    Counts per g alone confirm no accelerometer, and its size no magnetometer: other numbers are as large.
+    Other columns may hold numbers of the same size. So an accelerometer in counts needs gravity's rotation, and a
+    magnetometer needs a confirmed gyroscope and accelerometer.
     """
     confirmed = set(named)
     rate, force = guess.units.get("g", {}), guess.units.get("a", {})

@@ -63,5 +63,5 @@ def compare_stated(kind: str, stated: str, values: Array, still: NDArray[np.bool
 
 
 def _measure_rest(values: Array, still: NDArray[np.bool_]) -> float:
-    """Return the size of readings (n, 3) in the rows at rest, or in all if none is."""
+    """Return the median norm of readings (n, 3) in the rows at rest (`still`), or in all rows if no row is at rest."""
     return float(np.median(np.linalg.norm(values[still] if still.any() else values, axis=1)))

@@ -90,7 +90,7 @@ class LineReader:
         return LineBatch(np.zeros((0, self._columns)), np.zeros(0, np.int64), comments, b"")
 
     def _decode(self, data: bytes) -> LineBatch:
-        """Return the samples of whole lines.
+        """Return the samples of whole lines, and the counts of other lines.
 
         All lines are parsed at once. Lines with a right prefix and checksum that this fails to parse, usually because a
         field holds no number, are then read one by one, which is slower.
@@ -182,9 +182,10 @@ class LineReader:
         good: NDArray[np.bool_],
         sum_ok: NDArray[np.bool_],
     ) -> Array:
-        """Return the numbers (m, columns) of `good` lines with a right sum; clear `good` for lines without all numbers.
+        """Return the numbers (m, columns) of the m lines that are `good`, have a right checksum and have all numbers.
 
-        `good` and `sum_ok` are masks of the lines; `lines` are the positions of their starts and ends.
+        `good` and `sum_ok` are masks of the lines; `good` is cleared in place for lines without all numbers. `lines`
+        are the positions of their starts and ends.
         """
         line_starts, line_ends = lines
         number = np.concatenate([[False], classes == _NUMBER, [False]])
@@ -219,7 +220,7 @@ class LineReader:
 def _have_valid_bytes(
     classes: NDArray[np.uint8], line_starts: NDArray[np.intp], line_ends: NDArray[np.intp]
 ) -> NDArray[np.bool_]:
-    """Return a mask of lines whose bytes all have `classes` of a sample. Bytes between lines belong to no line."""
+    """Return a mask of the lines in which no byte has the class `_OTHER`; bytes between lines belong to no line."""
     good = np.ones(len(line_starts), np.bool_)
     others = np.flatnonzero(classes == _OTHER)
     if len(others):
@@ -259,7 +260,7 @@ def _markers(keys: tuple[str, ...]) -> Mapping[bytes, bytes]:
 
 
 def _classes(separator: bytes, *, keyed: bool) -> NDArray[np.uint8]:
-    """Return the class of each of the 256 bytes."""
+    """Return a table of the class of each of the 256 bytes: part of a number, space, key, separator, end or other."""
     classes = np.full(256, _OTHER, np.uint8)
     classes[np.frombuffer(b"0123456789+-.eE", np.uint8)] = _NUMBER
     classes[np.frombuffer(b" \t", np.uint8)] = _SPACE

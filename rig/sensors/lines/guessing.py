@@ -283,6 +283,7 @@ def _rate_unit(shape: Shape, guess: Guess, rates: Array, still: Flags) -> tuple[
         return None
     forces = forces[: blocks * block_size].reshape(blocks, block_size, 3).mean(axis=1)
     rates = rates[: blocks * block_size].reshape(blocks, block_size, 3).mean(axis=1)
+    # Least squares of df/dt, by central differences, against −(printed rate) × f.
     forces /= np.maximum(np.linalg.norm(forces, axis=1, keepdims=True), 1e-12)  # zeros before the first reading
     interval_s = 2 * block_size / guess.rate_hz
     change = (forces[2:] - forces[:-2]) / interval_s

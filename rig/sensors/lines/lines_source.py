@@ -238,7 +238,7 @@ def _make_triad(
 ) -> tuple[Channel, _Printed]:
     """Return a channel of three axes, and its columns.
 
-    The channel's step is that of the last printed digit, or if larger, that with which the range fits into 32 bits.
+    The channel's step is one unit of the last printed digit, or more if the range would not fit into 32 bits.
     """
     unit = section.scale * UNITS[section.unit].size
     step = 0.0 if section.decimals is None else unit * 10.0**-section.decimals

@@ -42,8 +42,8 @@ ColumnEntry = Mapping[str, Any]  # a column's entry: its name or number, and its
 class LogColumns:
     """The columns of a log: maps of `samples` and `motion`, in the form of the file of `--columns`.
 
-    `gaps`: sentences on properties of the columns that are unknown; `others`: the columns that are not read;
-    `reasons`: sentences on why some of these look like readings and are not read.
+    `gaps`: sentences on unknown properties of the columns; `others`: the columns that are not read; `reasons`:
+    sentences on why columns that look like readings are not read.
     """
 
     samples: Mapping[str, ColumnEntry]
@@ -55,7 +55,7 @@ class LogColumns:
     def correct_rate_unit(self, ratio: float) -> "LogColumns":
         """Return the columns with the gyroscope's unit corrected, if it was guessed by size alone.
 
-        `ratio`: how many times as fast as its readings, in the guessed unit, the gyroscope turned.
+        `ratio`: the gyroscope's true rate divided by its readings in the guessed unit.
         """
         gaps = [gap for gap in self.gaps if BY_SIZE not in gap]
         names = [f"{axis}{NAMES['g']}" for axis in AXES]
@@ -113,7 +113,7 @@ def guess_columns(layout: TableLayout, values: Array, time: Array | None, title:
 
 
 def _insert_time(layout: TableLayout, values: Array, time: Array) -> Array:
-    """Return the values with the column of time, which is NaN among them."""
+    """Return `values` with `time` in the layout's column of time, whose values are NaN."""
     return np.where(np.arange(values.shape[1]) == layout.time, time[:, None], values)
 
 
@@ -155,7 +155,7 @@ def _guess_samples(
 
 
 def _describe_undetermined(triads: Sequence[tuple[Sequence[str | int], Array]]) -> str:
-    """Return a sentence on columns that neither headings nor numbers show, three of values (n, 3) each."""
+    """Return a sentence on triads whose meaning is unknown; each is three columns' names and values (n, 3)."""
     columns = " ".join(str(column) for names, _ in triads for column in names)
     sizes = ", ".join(f"{np.median(np.linalg.norm(values, axis=1)):.3g}" for _, values in triads)
     return f"what {columns} are: no heading says it; their size is about {sizes}, and the Earth's field is 25 to 65 uT"
@@ -187,7 +187,7 @@ def _list_others(layout: TableLayout, entries: Sequence[ColumnEntry]) -> list[st
 
 
 def find_still(values: Array, rate_hz: float) -> NDArray[np.bool_]:
-    """Return a mask (n,) of rows at rest: each column scatters little more in their block than in the quietest one."""
+    """Return a mask (n,) of rows at rest, in whose block each column scatters little more than in its quiet blocks."""
     width = max(int(BLOCK_S * rate_hz), 5)
     count = len(values) // width
     if count < 2:
@@ -245,7 +245,8 @@ def _time_entry(layout: TableLayout, time: Array | None) -> dict[str, Any]:
 def _find_wrap(time: Array) -> int | None:
     """Return the power of two, in steps, at which a time counter restarts; None if it does not.
 
-    A counter restarts close below a power of two. A stamp that lost a digit falls as far, but from anywhere.
+    A counter restarts close below a power of two; a time that falls as far from elsewhere, as if it lost a digit, is no
+    restart.
     """
     time = time[np.isfinite(time)]
     if len(time) < 2 or time.max() < 100 or time.min() < 0:
