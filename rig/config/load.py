@@ -316,7 +316,7 @@ def _explain(model: type[BaseModel], item: Any, prefix: Location, layered: Merge
 
 
 def _hint_at_override(section: Location, layered: MergedLayers) -> str:
-    """Return the sensors that a misspelt `--set sensors.NAME.…` may mean; none if a file has this section."""
+    """Return a hint that only `--set` names a section, with the files' names that may be meant; "" if a file has it."""
     if layered.places.get(section) != SET:
         return ""
     siblings: Any = layered.document

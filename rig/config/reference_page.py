@@ -289,7 +289,7 @@ def _range(schema: Schema) -> str:
 
 
 def _describe_default(schema: Schema, required: bool) -> str:
-    """Return the value of a key that is left out."""
+    """Return the value that a key has if it is left out, in words or as in a file."""
     if "usual" in schema:
         return str(schema["usual"])
     if required:

@@ -133,7 +133,7 @@ def _unknown(folder: Path, entered: Mapping[str, set[tuple[str, str]]]) -> Itera
 
 
 def _names(run: KeptRun, folder: Path) -> set[str]:
-    """Return the names of the entered files; of those that may be on another computer, only the present ones."""
+    """Return the names of the entered files, without results and certificates that are not in this folder."""
     possible = {RESULT, *(name for certificate in run.certificates for name, _ in certificate.files)}
     return {name for name, _ in run.documents} | {name for name in possible if (folder / name).exists()}
 

@@ -313,7 +313,7 @@ def replacement_condition() -> Any:
 
 
 def chosen(question: Select[*tuple[Any, ...]], selection: Selection) -> Select[*tuple[Any, ...]]:
-    """Return a query for the selected runs, or for their calibrations."""
+    """Return the query `question`, for runs or for their calibrations, restricted to the selection."""
     if selection.serial_number is not None:
         question = question.where(_CALIBRATION.serial_number == selection.serial_number)
     if selection.part is not None:

@@ -67,15 +67,16 @@ class _Part:
 
 @dataclass(slots=True)
 class _Thinning:
-    """The selection of a dwell's states for the recording, by their times."""
+    """The selection, by time, of the states to record while the arm is at rest."""
 
     began_s: float | None = None
     last_s: float = 0.0
 
     def keeps(self, time_s: float) -> bool:
-        """Return whether to record the state at `time_s`: all for `FULL_RATE_S`, then one in each `REST_INTERVAL_S`.
+        """Return whether to record the state at `time_s`.
 
-        Call this for each state in order.
+        All states are recorded for `FULL_RATE_S`, then one in each `REST_INTERVAL_S`. Call this for each state in
+        order.
         """
         if self.began_s is None:
             self.began_s = time_s
@@ -146,7 +147,7 @@ class Acquisition:
         return self._heard
 
     def keep(self) -> None:
-        """Begin a new part in memory for data that arrive from now on; drop the oldest of too many parts."""
+        """Begin a new part in memory for data that arrive from now on; only the latest `KEPT_PARTS` parts remain."""
         with self._lock:
             self._kept.append(_Part(defaultdict(list), []))
 

@@ -52,7 +52,7 @@ from rig.turners.turner_registry import kind_of
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """A run; its laboratory, if simulated, is already running.
+    """One run in its `folder`, with all its phases; a simulated laboratory must already be running.
 
     - `script`: the script of the first phase.
     - `memory`: the sensors' earlier calibrations.

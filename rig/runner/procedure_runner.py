@@ -350,7 +350,7 @@ class Rig:
         return True
 
     def wait_for_next_temperature(self, rest: Rest) -> bool:
-        """Stand still until the sensors have the next set's temperature; return False if the range is covered.
+        """Stand still until the sensors have the next temperature for sweeps; return False if the range is covered.
 
         Raise Refused `other_procedure` if the procedure has no temperatures, Fault `range_not_reached`.
         """
@@ -391,7 +391,7 @@ class Rig:
         return self.warming
 
     def _end_set(self) -> None:
-        """End the temperature set, which has all sweeps and dwells since the latest wait."""
+        """End the sweeps and dwells at one temperature, which are those since the latest wait."""
         if self.warming is not None and self._done:
             self.warming.end_set(min(self._done), max(self._done) + 1)
         self._done.clear()

@@ -59,7 +59,10 @@ class _RecentReadings:
 
 
 def _has_settled(ratios: Sequence[float]) -> bool:
-    """Return whether readings scatter as at rest, or more if their scatter (`_RecentReadings.over_rest`) is steady."""
+    """Return whether readings scatter as little as at rest, or somewhat more but no longer less from span to span.
+
+    `ratios` are those of `_RecentReadings.over_rest`.
+    """
     if not ratios:
         return False
     return (
@@ -70,7 +73,7 @@ def _has_settled(ratios: Sequence[float]) -> bool:
 
 
 def _is_steady(ratios: Sequence[float], spans: int, least: float) -> bool:
-    """Return whether the mean scatter of the newest spans is at least this fraction of that of as many before."""
+    """Return whether the newest `spans` scatter at least `least` times as much as equally many spans before them."""
     newest, before = ratios[:spans], ratios[spans : 2 * spans]
     return len(before) == spans and sum(newest) >= least * sum(before)
 

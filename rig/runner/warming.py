@@ -36,7 +36,7 @@ class Warming:
 
     - `names`: the sensors whose thermometers are used.
     - `heater`: the board with the heater, None if the operator changes the temperature.
-    - `set_s`: the duration of a set, planned or the longest so far.
+    - `set_s`: the duration of a set (all sweeps and dwells at one temperature), planned or the longest so far.
     """
 
     section: ThermalSection

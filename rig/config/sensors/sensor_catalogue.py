@@ -83,7 +83,7 @@ class PartSpec:
         return self.acceleration_noise_ug_sqrt_hz / sqrt(2)
 
     def accept_rate(self, rate_hz: float) -> float:
-        """Return the part's exact rate for a nominal `rate_hz`. Raise ValueError, with the nearest, if none fits."""
+        """Return the part's exact rate for a nominal `rate_hz`. Raise ValueError, with the nearest, if no rate fits."""
         if self.any_rate:
             return positive(rate_hz)
         return nearest_rate(rate_hz, self.rates_hz, self.rates_rule)
@@ -102,7 +102,7 @@ class MagnetometerPart:
     default_rate_hz: float
 
     def accept_rate(self, rate_hz: float) -> float:
-        """Return the part's exact rate for a nominal `rate_hz`. Raise ValueError, with the nearest, if none fits."""
+        """Return the part's exact rate for a nominal `rate_hz`. Raise ValueError, with the nearest, if no rate fits."""
         return nearest_rate(rate_hz, self.rates_hz, list_numbers(self.rates_hz))
 
     def accept_range(self, range_gauss: float) -> float:

@@ -50,7 +50,7 @@ def utc(text: str) -> str:
 
 
 def unlike(document: ResultDocument, recomputed: Sequence[HistoryRecord]) -> Iterator[str]:
-    """Yield the differences of `recomputed` calibrations from the stated ones, beyond a processor's rounding."""
+    """Yield the differences of `recomputed` calibrations from the document's; the rounding of processors is allowed."""
     stated = {(record.sensor, record.quantity): record for record in history_records(document)}
     present = {(record.sensor, record.quantity): record for record in recomputed}
     for sensor, quantity in sorted(stated.keys() ^ present.keys()):

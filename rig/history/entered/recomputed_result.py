@@ -16,7 +16,7 @@ UNCOMPARED_FIELDS = ("iterations", "solved_utc")  # the same result may take oth
 
 
 def differing_parts(claimed: ResultDocument, recomputed: ResultDocument) -> list[str]:
-    """Return the parts of a `claimed` result that differ from the recomputed one beyond a processor's rounding.
+    """Return the parts of a `claimed` result that differ from the recomputed one by more than processors' rounding.
 
     `recomputed` is solved from the recordings. Calibrations agree within 1e-6 of their standard uncertainty, other
     numbers within 1e-6 of the largest in their list. Texts, and fields that the claimed result lacks, are not compared,

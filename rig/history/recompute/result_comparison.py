@@ -55,7 +55,7 @@ class RecomputedResult:
 
 @dataclass(frozen=True, slots=True)
 class Unsolved:
-    """Why recordings have no present result, by the kind of reason and in words."""
+    """The reason why recordings have no present result: its kind `state`, and `why` in words."""
 
     state: State
     why: str
@@ -91,7 +91,7 @@ class ParameterMove:
 
 @dataclass(frozen=True)
 class ComparedResult:
-    """A stated result, and the `answer` recomputed from its recordings, or None; a change counts above `of_u` × U."""
+    """A stated result, and the `answer` recomputed from its recordings, if any. Changes above `of_u` × U count."""
 
     stated: StatedResult
     answer: Answer | None

@@ -20,10 +20,11 @@ FRAME_STROKES, CELL_FRAME = 1, 3  # width of the frame: one stroke, and for each
 
 @dataclass(frozen=True, slots=True)
 class TableColumn:
-    """A table's column. If columns do not fit, the column of the highest `rank` is omitted first, one of rank 0 never.
+    """A table's column, with a `rank` that decides which columns are omitted if not all fit.
 
-    Before a column is omitted, it is replaced by its `shorter` column, if any. A column that `wraps` may use several
-    lines, and is at least `least` cells wide.
+    The column of the highest rank is omitted first; a column of rank 0 is never omitted. Before a column is omitted, it
+    is replaced by its `shorter` column, if any. A column that `wraps` may use several lines, and is at least `least`
+    cells wide.
     """
 
     heading: str

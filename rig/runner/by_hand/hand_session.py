@@ -188,7 +188,7 @@ class HandSession:
         )
 
     def _pauses_before(self, rest: HandRest) -> None:
-        """Discard rests that are too short to be judged, because they are pauses within a move."""
+        """Discard the unjudged rests before `rest`, which are too short and so are pauses within a move."""
         for pause in self._segmenter.handled.rests:
             if self._judged_s < pause.start_s and pause.end_s < rest.start_s:
                 event = HandRestRefused(*self._board_us(pause), "held_not_laid_down")

@@ -44,7 +44,10 @@ FAULTS = {  # the board's term: the error's name, what, what to do
 
 @dataclass(frozen=True, slots=True)
 class CalibratedByBoard:
-    """The board's solution for the sensor `index`, and its agreement with double precision, None without readings."""
+    """The board's solution for the sensor `index`, and its agreement with the solution by this computer.
+
+    `agreement` is None if this computer has no readings of the session.
+    """
 
     index: int
     solved: BoardHandSolution
