@@ -60,7 +60,7 @@ class ObservationKeys(BaseModel):
 
 
 class UncertaintyKeys(BaseModel, Generic[OfSensors]):
-    """The stated sizes of errors: the keys of the section `uncertainty`; those about sensors have the type `OfSensors`."""
+    """The stated sizes of errors: the keys of the section `uncertainty`; those of sensors have the type `OfSensors`."""
 
     model_config = JUDGING_MODEL
 
