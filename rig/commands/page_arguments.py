@@ -49,9 +49,9 @@ class PageWish:
 
 @dataclass(frozen=True, slots=True)
 class OperatorsPage:
-    """The page of a run: its `listeners`, how it gets answers in place of the terminal, and its wait at the end.
+    """The page of a run: the `listeners` through which it shows the run, and two functions.
 
-    `answer` is None if the terminal asks; `stay` keeps the page open after the run.
+    `answer` asks the operator on the page; it is None if the terminal asks. `stay` keeps the page open after the run.
     """
 
     listeners: "tuple[Listener, ...]" = ()

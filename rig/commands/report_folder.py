@@ -10,7 +10,7 @@ from rig.errors.extras import requiring
 
 @contextmanager
 def refuse_unwritable(folder: Path, option: str = "--out") -> Iterator[None]:
-    """Raise Refused `report_folder` if the block cannot write; `option` chooses another folder."""
+    """Raise Refused `report_folder` if the block cannot write into the folder; its remedy names the `option`."""
     try:
         yield
     except OSError as error:

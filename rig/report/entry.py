@@ -39,7 +39,7 @@ def error_entry(fault: Fault) -> ErrorEntry:
 
 
 def when_entry(when: "Conditions") -> ConditionsEntry:
-    """Return time and temperature of a value, times to the second."""
+    """Return the entry of the times, to the second, and the temperature at which a value was measured."""
     times = {name: getattr(when, name).isoformat(timespec="seconds") for name in ("from_utc", "to_utc", "mean_utc")}
     return entry(ConditionsEntry, when, **times)
 

@@ -21,7 +21,7 @@ Vector3 = tuple[Finite, Finite, Finite]
 
 @dataclass(frozen=True, slots=True)
 class TrueGyroscope:
-    """True bias, and scale factors if they are defined, of a simulated gyroscope over the windows of the run."""
+    """Means of a simulated gyroscope's true bias, and of its scale factors if defined, over the run's time windows."""
 
     bias_rad_s: Vector3
     scale: Vector3 | None = None
@@ -29,7 +29,7 @@ class TrueGyroscope:
 
 @dataclass(frozen=True, slots=True)
 class TrueAccelerometer:
-    """True bias and scale factors of a simulated accelerometer over the windows of the run."""
+    """Means of a simulated accelerometer's true bias and scale factors over the run's time windows."""
 
     bias_m_s2: Vector3
     scale: Vector3

@@ -15,7 +15,7 @@ def fine_axes(quantity: Quantity, end_of_scale: float) -> Channel:
 
 
 def thermometer_channels(provided: Channel | None, stated: StatedTemperatureSection | None) -> tuple[Channel, ...]:
-    """Return the channel of the temperature that the source provides, else of a stated one; empty without either."""
+    """Return a tuple with the channel of the provided temperature, or else of the stated one; empty without both."""
     if provided is not None:
         return (provided,)
     return () if stated is None else (make_stated_temperature_channel(stated.stated_c, stated.stated_within_k),)

@@ -8,9 +8,10 @@ from rig.errors import Refused
 
 
 def read_world_section(loaded: Loaded) -> WorldSection:
-    """Return the section of the simulated laboratory. Sensors without their own position have the turner's.
+    """Return the section of the simulated laboratory.
 
-    Raise Refused `no_world` if the file has no such section.
+    Sensors without a stated position are at the end of the turner's extension. Raise Refused `no_world` if the file has
+    no such section.
     """
     if not loaded.simulated:
         raise Refused(

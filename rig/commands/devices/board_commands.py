@@ -139,7 +139,11 @@ def _connect(options: Namespace) -> Iterator[tuple[RigConfig, Board]]:
 def _read_slots(
     board: Board, config: RigConfig, sensor: str | None, among: Mapping[str, SensorSection]
 ) -> list[BoardSlot]:
-    """Return a command's sensors with stored calibrations. Raise Refused `no_such_sensor`, `sensor_missing`."""
+    """Return the command's sensors on the board, each with its stored calibration, if any.
+
+    `sensor` names the only one, or is None for all `among` the candidates. Raise Refused `no_such_sensor`,
+    `sensor_missing`.
+    """
     among = {name: section for name, section in among.items() if section.on_board}
     if sensor is not None and sensor not in among:
         raise Refused(

@@ -34,7 +34,7 @@ def add(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Print the KVH 1775 at the given port, or every one in the configuration; return 2 if one has a problem.
+    """Print the KVH 1775 at the given port, or each instrument in the configuration; return 2 if one has a problem.
 
     Raise Refused `no_kvh_section` for a configuration without any.
     """

@@ -119,7 +119,7 @@ def _draw_changes(title: str, changes: Sequence[Change], folder: Path, name: str
 
 
 def rigs(options: Namespace) -> int:
-    """Print how the rigs compare by check standards and shared sensors. Return 1 if a rig is out of control."""
+    """Print a comparison of the rigs by check standards and shared sensors. Return 1 if a rig is out of control."""
     with open_named_history(options) as history:
         pasts = history.calibrations(Selection(part=options.part, since=options.since))
     states, rig_effects = rig_states(pasts), effects(pasts)

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class CalibrationComparison:
-    """A calibration of this run, and the changes since the last one of the same sensor."""
+    """A calibration of this run (`now`), the sensor's previous one (`before`), and the changes between them."""
 
     before: "Past"
     now: "Past"

@@ -73,7 +73,7 @@ def distribute(tasks: Iterable[Task], solve: Solve, workers: Workers) -> Iterato
 
 
 class Processes(AbstractContextManager["Processes"]):
-    """Processes of this computer, each a pool of its own, so that a crash affects no other."""
+    """Processes of this computer, each in a pool of its own, so that the crash of one affects no other process."""
 
     def __init__(self, count: int) -> None:
         self._idle = [_new_process() for _ in range(count)]

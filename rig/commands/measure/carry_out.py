@@ -38,7 +38,7 @@ def carry_out(
     as_json: bool,
     page: PageWish | None,
 ) -> int:
-    """Carry out the phases in a run folder, or continue them; also on a `page` if requested.
+    """Carry out the phases in a run folder, or continue them; show the run on a `page` too, if requested.
 
     Return 0 if passed, 1 if failed. `moved` are serial numbers of sensors that are declared to have changed boards.
     """

@@ -41,7 +41,7 @@ def add_outcome(parser: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Run the procedure in a new run folder; also on a page if requested. Return 0 if passed, 1 if failed."""
+    """Run the procedure in a new run folder, on a page too if requested. Return 0 if it passed, 1 if it failed."""
     page = read_page_wish(options)
     with prepare_run(options) as (folder, configured):
         from rig.commands.measure.carry_out import (

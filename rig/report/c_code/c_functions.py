@@ -48,7 +48,7 @@ def _warm(temperature_c: float | None) -> str:
 
 
 def prefix_of(name: str) -> str:
-    """Return the prefix of a sensor's names in C."""
+    """Return the prefix of all C names that belong to the sensor `name`."""
     return re.sub(r"^(?=[^a-z])", "sensor_", re.sub(r"[^a-z0-9]", "_", name.lower()))
 
 
@@ -98,7 +98,7 @@ def _gravity_correction(prefix: str, sensitivity: Array) -> Iterator[str]:
 def _subtraction_lines(
     finding: Finding[Any], bias: Sequence[float], matrix: Sequence[Sequence[float]], true: str, about: Sequence[str]
 ) -> Iterator[str]:
-    """Yield bias, matrix and correction function of a sensor whose bias is subtracted from its reading.
+    """Yield C source of bias, matrix and correction function for a sensor whose bias is subtracted from readings.
 
     `true` is the C name of the corrected value; `about` are the lines of the comment above the C source.
     """

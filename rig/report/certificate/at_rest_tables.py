@@ -70,7 +70,7 @@ def reversal_rows(entry: ReversalEntry) -> list[ReversalRow]:
 
 
 def drift_rows(entry: DriftEntry) -> list[DriftRow]:
-    """Return a row for each axis of a bias drift, in its unit of drift, with U."""
+    """Return a row for each axis of a bias drift, with U, in the quantity's unit of drift."""
     bias, std = (np.array([getattr(repeat.scale_fixed, name) for repeat in entry.repeats]) for name in ("bias", "std"))
     total = np.hypot(std, entry.common_std)  # of the bias itself: in a change of the bias the common error cancels
     change_std, slope = largest_change_std(bias, std), entry.temperature_slope

@@ -60,7 +60,7 @@ class RestCalibration:
 
     @property
     def whose(self) -> str:
-        """The scale to which the values refer, named by its sensor with an article: "a gyroscope's scale"."""
+        """Words for the scale of these sensors, with an article, such as "an accelerometer's scale"."""
         return f"{'an' if self.kind[0] in 'aeiou' else 'a'} {self.kind}'s scale"
 
 

@@ -34,7 +34,7 @@ class UprightAxis:
 
     @classmethod
     def fit(cls, largest: float, units: Sequence[DisplayUnit]) -> "UprightAxis":
-        """Return an axis to a round limit above `largest`, in the first unit in which `largest` exceeds 1."""
+        """Return an axis with a round reach above `largest`, in the first of `units` in which `largest` exceeds 1."""
         unit = next((unit for unit in units if largest >= unit.size), units[-1])
         shown = largest / unit.size
         decade = 10 ** np.floor(np.log10(max(shown, 1e-9)))
@@ -54,7 +54,7 @@ class UprightAxis:
 
 @dataclass(frozen=True, slots=True)
 class PlotPoint:
-    """A residual and its bar, in pixels."""
+    """A point of a plot in pixels: a residual of the axis number `axis`, and its bar from `low` to `high`."""
 
     x: float
     y: float
@@ -65,7 +65,7 @@ class PlotPoint:
 
 @dataclass(frozen=True, slots=True)
 class Residuals:
-    """Three values of each sweep and rest, of each attitude, or of each repeat, as points with bars.
+    """A plot of residuals: three points with bars for each sweep and rest, for each attitude, or for each repeat.
 
     `ticks` are heights with their labels. `split` is the abscissa at which the rests begin, if there are any. `within`
     is the number of bars that contain zero. `shown` describes the points, `expectation` the bars of two standard
@@ -97,18 +97,18 @@ class Contributions:
 
 
 def residuals(finding: Finding[GyroscopeEntry]) -> Residuals | None:
-    """Return the residuals of a gyroscope's sweeps and rests; None if there are none."""
+    """Return the plot of the residuals of a gyroscope's sweeps and rests; None without residuals."""
     unexplained = find_sweep_residuals(finding)
     return None if unexplained is None else _draw(unexplained)
 
 
 def attitude_residuals(finding: Finding[Any]) -> Residuals:
-    """Return the residuals of each attitude."""
+    """Return the plot of the residuals of each attitude."""
     return _draw(find_attitude_residuals(finding))
 
 
 def biases_by_repeat(finding: Finding[DriftEntry]) -> Residuals:
-    """Return the bias in each repeat of the attitudes, minus the mean over all repeats."""
+    """Return the plot of the bias in each repeat of the attitudes, minus the mean over all repeats."""
     return _draw(find_repeat_residuals(finding))
 
 
@@ -130,7 +130,7 @@ def _draw(unexplained: Unexplained) -> Residuals:
 
 
 def contributions(budget: BudgetEntry, scale: Sequence[float]) -> Contributions:
-    """Return the ratio of each contributor's standard uncertainty to the combined one, at least 1e-4, for a plot."""
+    """Return the plot of each contributor's standard uncertainty divided by the combined one, at least 1e-4."""
     k, b = find_printed_indices(budget, scale)
     across = (WIDTH - NAMES - RIGHT_MARGIN) / DECADES
 

@@ -17,7 +17,10 @@ FRACTION_UNITS = (DisplayUnit("%", 1e-2), DisplayUnit("ppm", 1e-6))
 
 @dataclass(frozen=True, slots=True)
 class Curves:
-    """A picture: band and line of each axis as points of SVG; `ticks` are heights, `marks` temperatures."""
+    """A picture of curves: `axes` has the points, in SVG, of each axis' band and of its line.
+
+    `ticks` are labelled heights, `marks` labelled abscissas of temperatures, in pixels.
+    """
 
     axes: tuple[tuple[str, str], ...]
     ticks: tuple[tuple[float, str], ...]
@@ -34,7 +37,7 @@ class TemperatureRow:
 
 
 def temperature_rows(entry: OverTemperatureEntry, unit: DisplayUnit) -> list[TemperatureRow]:
-    """Return the rows with U, biases in `unit`."""
+    """Return the rows of the entry's temperature table with U, and with biases in `unit`."""
     return [
         TemperatureRow(
             f"{row.temperature_c:.1f}",

@@ -45,7 +45,7 @@ def hand_entry(solution: "HandSolution") -> ByHandEntry:
 
 
 def hand_lines(entry: ByHandEntry) -> Iterator[str]:
-    """Yield faces, moves and error estimates in words."""
+    """Yield lines on the faces, the moves, and the estimated errors of a session by hand."""
     flips, turns = (sum(move.kind == kind for move in entry.moves) for kind in ("flip", "turn"))
     faces = " ".join(rest.face or "(none)" for rest in entry.rests)
     yield f"by hand: {len(entry.rests)} rests, {flips} flips, {turns} turns; faces upwards: {faces}"

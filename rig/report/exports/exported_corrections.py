@@ -54,13 +54,13 @@ class ExportedCalibrations:
 
     @property
     def not_in_imus(self) -> tuple[str, ...]:
-        """Results that an IMU's file cannot hold: other sensors, and `further_terms`."""
+        """The names of results that an IMU's file cannot hold: those of other sensors, and `further_terms`."""
         parts = [triad for imu in self.imus for triad in (imu.gyroscope, imu.accelerometer)]
         return (*(triad.name for triad in self.sensors if triad not in parts), *self.further_terms)
 
     @property
     def further_terms(self) -> tuple[str, ...]:
-        """Results other than scale and bias, for which no format has a place."""
+        """The names of results other than scale and bias, for which no format has a place."""
         terms = (term for term in terms_of(self.result, "exports") if not term.finding.is_reference)
         return tuple(printable(f"{term.whose}, {term.name}") for term in terms)
 
@@ -75,7 +75,7 @@ class ExportedCalibrations:
 
 
 def calibrations(result: ResultDocument) -> ExportedCalibrations:
-    """Return the corrections of all kinds of results; references are left out."""
+    """Return the corrections that follow from a result, for all kinds of sensors except references."""
     corrections = (correct(finding) for _, correct, finding in outlets(result, lambda kind: kind.corrected))
     sensors = tuple(correction for correction in corrections if correction is not None)
     return ExportedCalibrations(result, sensors, result.over_temperature)

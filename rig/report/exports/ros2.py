@@ -61,7 +61,7 @@ def _write(recordings: Sequence[Exported], gyroscopes: Iterable[str], path: Path
 
 
 def _messages(types: Mapping[str, Any], recording: Exported, name: str, frame: str) -> Iterator[tuple[int, Any]]:
-    """Yield stamp in ns and message of each sample."""
+    """Yield the time stamp, ns, and the message of each sample."""
     imu, header, time = (
         types[name] for name in ("sensor_msgs/msg/Imu", "std_msgs/msg/Header", "builtin_interfaces/msg/Time")
     )

@@ -55,7 +55,10 @@ def _drift_range(entry: Any) -> str:
 
 
 def _slope_of(polynomial: str, part: slice) -> Callable[[Any], UncertainNumbers]:
-    """Return a function that reads a polynomial's slope at the reference temperature from an entry."""
+    """Return a function that reads a polynomial's slope at the reference temperature from an entry.
+
+    `part` selects the slope's elements in the entry's covariance.
+    """
 
     def read(entry: Any) -> UncertainNumbers:
         stds = np.sqrt(np.diag(np.array(entry.covariance)).clip(min=0.0))

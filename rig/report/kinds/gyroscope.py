@@ -151,7 +151,7 @@ def _lines(finding: Finding[GyroscopeEntry]) -> Iterator[str]:
 
 
 def _describe_difference(sensor: GyroscopeEntry, other: EstimateEntry | VectorEntry) -> Iterator[str]:
-    """Yield a sentence if an `other` method's result differs by more than U from the better one of the vector model."""
+    """Yield a sentence if an `other` method's result differs by more than U from that of the vector model."""
     expanded = expand_uncertainties(sensor.budget, sensor.covariance)
     values, others = ((*solution.scale, *solution.bias_rad_s) for solution in (sensor, other))
     differences = divide_or_infinity(np.abs(np.subtract(others, values)), expanded)

@@ -54,7 +54,7 @@ def _render(finding: Finding[VerificationEntry]) -> Iterator[Table | str]:
 
 
 def verification_table(name: str, entry: VerificationEntry) -> Table:
-    """Return a table of the errors of each axis before and after calibration; dashes if none were read before."""
+    """Return a table of the errors of each axis before and after calibration; a dash stands for an unknown value."""
     table = build_number_table(
         ("axis", "RMS before rad/s", "RMS after rad/s", "of that noise", "MSE before (rad/s)²", "MSE after"),
         f"{name} against {entry.reference}, sweeps and rests",
@@ -73,7 +73,7 @@ def verification_table(name: str, entry: VerificationEntry) -> Table:
 
 
 def verification_lines(entry: VerificationEntry) -> Iterator[str]:
-    """Yield the lines below `verification_table`, ± two standard uncertainties: mounting, reference, turns, delays."""
+    """Yield the lines below the table, on mounting, reference, turns and delays, ± two standard uncertainties."""
     rotation = entry.rotation
     angles = " ".join(f"{angle:+.3f}" for angle in np.degrees(rotation.from_nominal_rad))
     expanded_deg = 2 * np.degrees(max(rotation.std_rad))

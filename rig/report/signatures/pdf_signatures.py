@@ -90,7 +90,7 @@ def _alterations(signature: Any, status: Any, content: bytes, attached: Sequence
 def _inspect_signature(
     name: str, signature: Any, status: Any, trust: Trust, lists: Sequence[CertificateList]
 ) -> tuple[SignatureReport, list[Refused]]:
-    """Return the signature, and problems of its signer or of its time stamp."""
+    """Return the signature's report, and the problems of its signer and of its time stamp."""
     stamp = status.timestamp_validity
     is_intact = stamp is not None and stamp.intact and stamp.valid
     stamped = is_intact and stamp.trusted

@@ -13,7 +13,10 @@ from rig.station.plain_text import build_number_table, plain
 
 
 def account_document(account: AttitudeAccount) -> dict[str, Any]:
-    """Return the expected accuracy in SI units; `condition_second_order` is null if that order is not determined."""
+    """Return the expected accuracy in SI units.
+
+    `condition_second_order` is null if the attitudes do not determine the terms of second order.
+    """
     return {
         "count": account.count,
         "order": account.order,

@@ -161,7 +161,7 @@ def _format_axes(three: AxisValues) -> list[str]:
 
 
 def _describe_values(items: Sequence[_SensorValues]) -> Iterator[str]:
-    """Yield what the printed numbers mean: U or noise, the speeds, and the model of each kind of sensor."""
+    """Yield lines that explain the printed numbers: U or noise, the speeds, and the model of each kind of sensor."""
     if not items:
         return
     combined = all(item.shown.combined for item in items)

@@ -19,14 +19,14 @@ class Expanded:
 
 
 def expanded(stds: Sequence[float], counted: Sequence[Freedom] | None) -> Expanded:
-    """Return U = k u by Student's t; two standard deviations if the degrees of freedom are unknown."""
+    """Return U = k u for standard uncertainties u (`stds`), with k from Student's t, or 2 if `counted` is unknown."""
     dofs = [np.inf if dof is None else dof for dof in counted or [None] * len(stds)]
     factors = coverage_factors(dofs)
     return Expanded((factors * np.array(stds)).tolist(), factors.tolist(), coverage_probability(factors, dofs).tolist())
 
 
 def factor_words(dof: Sequence[Freedom] | None) -> str:
-    """Return k as printed: one number if all are equal, else the smallest and the largest."""
+    """Return the coverage factors k for degrees of freedom as printed: a single number, or the smallest and largest."""
     if dof is None:
         return f"k = {COVERAGE_FACTOR:g}, degrees of freedom not counted"
     return spell_factors(expanded([1.0] * len(dof), dof).factors)

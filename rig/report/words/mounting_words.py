@@ -14,12 +14,12 @@ MIN_MEASURED_RATIO = 1e-6  # ratio to its uncertainty, below which a rotation is
 
 
 def mount_lines(result: ResultDocument) -> Iterator[str]:
-    """Yield a line for each stage after the first, relative to the first; nothing if the mounting never changed."""
+    """Yield a line on each stage's mounting relative to the first stage's; nothing if the mounting never changed."""
     yield from map(_line, _significant_mounts(result))
 
 
 def farthest_off(result: ResultDocument) -> Iterator[str]:
-    """Yield the line of the stage with the largest mounting error, then a line with the number of the other stages."""
+    """Yield the line of the stage with the largest mounting error, which also counts the other stages."""
     mounts = _significant_mounts(result)
     if not mounts:
         return

@@ -44,7 +44,7 @@ class MagneticFieldReader:
         return self._assemble(rows[~incomplete], axes[~incomplete])
 
     def _assemble(self, rows: NDArray[Any], axes: NDArray[np.int64]) -> NDArray[Any]:
-        """Return a sample for each three successive rows of x, y and z with the same number, at the time of y."""
+        """Return a sample for each reading number whose three axes x, y, z are in successive rows, at the time of y."""
         starts = np.flatnonzero(axes == 0)
         starts = starts[starts + 2 < len(rows)]
         same = (rows["sequence"][starts] == rows["sequence"][starts + 2]) & (axes[starts + 2] == 2)

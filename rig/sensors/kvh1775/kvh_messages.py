@@ -92,7 +92,7 @@ class BuiltInTest:
 
 @dataclass(frozen=True, slots=True)
 class MessageBatch:
-    """Decoded bytes: `messages` (n,) MESSAGE_DTYPE in order, and built-in tests."""
+    """The contents of decoded bytes: `messages` (n,) of MESSAGE_DTYPE in order, and results of built-in `tests`."""
 
     messages: NDArray[Any]
     tests: tuple[BuiltInTest, ...]

@@ -60,7 +60,7 @@ class Kvh1775Settings:
 
 
 def corrections(stored: Mapping[str, str], required: Kvh1775Settings) -> dict[str, str]:
-    """Return the settings to change, in order; `stored` has all `NAMES`."""
+    """Return the settings to change, in order, with their `required` values; `stored` must have all `NAMES`."""
     target = required.settings
     return {name: target[name] for name in NAMES if name in target and not same(stored[name], target[name])}
 

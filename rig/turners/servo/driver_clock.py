@@ -23,7 +23,7 @@ class Clock(Protocol):
 
 
 class HostClock:
-    """The host's clock; its time stamps are those of the raw monotonic clock, which is never slewed, if there is one.
+    """The host's clock. If the host has a raw monotonic clock, which is never slewed, time stamps are of that clock.
 
     The servo's clock (Realtime Tick) is unsuitable, because it counts milliseconds of an oscillator with 1 % tolerance.
     """

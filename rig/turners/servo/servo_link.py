@@ -181,7 +181,7 @@ class ServoLink:
         return False
 
     def _look(self) -> None:
-        """Check torque and watchdog, which are not in the block of states."""
+        """Check torque and watchdog, which a polled state does not contain."""
         if not self.supervising:
             return
         self._looks += 1

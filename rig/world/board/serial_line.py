@@ -92,7 +92,7 @@ class SerialLine:
 
 
 class SerialSession:
-    """The line over TCP, which carries no baud rate."""
+    """The session of a client that uses the line over TCP, which carries no baud rate."""
 
     closing = False
     dialogue = False

@@ -105,7 +105,7 @@ def _draw_pushes(
 
 
 def _pulse(time_s: Array, begins_s: float, lasting_s: float) -> Array:
-    """Return a raised cosine of area 1, (n,)."""
+    """Return the values (n,) of a raised-cosine pulse whose integral over time is 1."""
     part = np.clip((time_s - begins_s) / lasting_s, 0, 1)
     return np.asarray((1 - np.cos(2 * np.pi * part)) / lasting_s, dtype=np.float64)
 

@@ -123,7 +123,10 @@ def _numbers(layout: struct.Struct, payload: bytes) -> tuple[float, ...]:
 
 
 def packages(buffer: bytearray) -> Iterator[tuple[int, bytes]]:
-    """Yield complete packages and remove them from the start of `buffer`. Raise `ConnectionError` for other bytes."""
+    """Yield type and payload of complete packages, and remove these from the start of `buffer`.
+
+    Raise `ConnectionError` for bytes that are no package.
+    """
     while len(buffer) >= HEADER.size:
         size, kind = HEADER.unpack_from(buffer)
         if not HEADER.size <= size <= MAX_SIZE:

@@ -14,7 +14,10 @@ def package(kind: str, payload: bytes) -> bytes:
 
 
 def packages(buffer: bytearray) -> Iterator[tuple[str, bytes]]:
-    """Yield complete packages and remove them from the start of `buffer`. Raise `ConnectionError` for other bytes."""
+    """Yield type and payload of complete packages, and remove these from the start of `buffer`.
+
+    Raise `ConnectionError` for bytes that are no package.
+    """
     while len(buffer) >= HEADER.size:
         size, kind = HEADER.unpack_from(buffer)
         if size < HEADER.size:

@@ -155,7 +155,7 @@ class RtdeSession:
         return build_package("O", lead + ",".join(kinds).encode())
 
     def _setup_inputs(self, payload: bytes) -> bytes:
-        """Set up an input recipe and claim its registers; answer with the types, or why it is refused."""
+        """Set up an input recipe and claim its registers; answer with the types, or with the reason for a refusal."""
         if len(self._inputs) == INPUT_RECIPES:
             return self._say("no more input recipes") + build_package("I", b"\0")
         names = _names(payload)

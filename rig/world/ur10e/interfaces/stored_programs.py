@@ -33,10 +33,10 @@ class StoredPrograms:
         return self._documents[name]
 
     def store(self, form: bytes, *, replace: bool) -> str:
-        """Store the document that a client sends, and return its name.
+        """Store the document in the `form` that a client sends, and return its name.
 
-        With `replace`, a document of the same name must already be stored, otherwise none may be. Raise ValueError if
-        this is not so, or if the form contains no document.
+        With `replace` the document replaces one of the same name. Raise ValueError if none has this name, or without
+        `replace` if one has it, or if the form contains no document that can be stored.
         """
         text = form[form.find(b"{") : form.rfind(b"}") + 1].decode()
         try:

@@ -64,7 +64,7 @@ def solve_inverse_kinematics(pose: Sequence[float], start_rad: Joints, links: Li
 def solve_joint_speeds(q: Joints, tool_speed: Sequence[float], links: Links = NOMINAL) -> Joints:
     """Return the joint speeds, rad/s, for a flange twist (m/s, rad/s, base frame), within the joint limits.
 
-    A faster twist is scaled down. Raise `ProgramError` if the arm is singular.
+    A twist that would exceed a joint's limit is scaled down. Raise `ProgramError` if the arm is singular.
     """
     try:
         speeds = np.linalg.solve(_jacobian(q, links), np.array(tool_speed))

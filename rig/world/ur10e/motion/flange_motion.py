@@ -77,9 +77,9 @@ def propagate(
 
 
 def transfer_force(rate: Components, change: Components, force: Components, lever_arm_m: Sequence[float]) -> Components:
-    """Return the specific force at a point of the body, `lever_arm_m` from the point that has `force`, in its axes.
+    """Return the specific force at a point of the body that is `lever_arm_m` from the point with the force `force`.
 
-    `rate` is the body's angular rate and `change` its angular acceleration.
+    `rate` is the body's angular rate and `change` its angular acceleration. All vectors are in the body's axes.
     """
     x, y, z = rate
     u, v, w = change

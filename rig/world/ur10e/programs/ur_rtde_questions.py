@@ -13,7 +13,7 @@ from rig.world.ur10e.robot import Robot
 
 
 def build_questions(robot: Robot, registers: ProgramRegisters) -> dict[int, Callable[[], None]]:
-    """Return each command that takes no time as a function, which raises `ProgramError` if the program would end."""
+    """Return a function for each command that takes no time, by number; it raises `ProgramError` to end the program."""
 
     def put(values: Sequence[float]) -> None:
         registers.write_doubles(values)
