@@ -42,7 +42,7 @@ class _Unbroken:
 
 
 def output_lost() -> OSError | None:
-    """Return why stdout has lost output since the last call, or None."""
+    """Return why stdout has lost output since the last call; None if it has lost nothing."""
     stream = sys.stdout
     if not isinstance(stream, _Unbroken):
         return None

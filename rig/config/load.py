@@ -50,7 +50,7 @@ class Loaded:
     """A valid configuration.
 
     - `simulated`: whether the file has a `world:` section, which only the simulated laboratory reads, from `text`.
-    - `flash_file`: the file with the simulated board's memory, or None.
+    - `flash_file`: the file with the simulated board's memory, None without such a file.
     - `text`: the file as used, merged with base and overrides; `rig_text`: the same without the `world:` section, as
       recorded.
     """

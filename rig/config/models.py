@@ -315,7 +315,7 @@ class SensorsConfig(Section):
 
     @property
     def reference(self) -> tuple[str, SensorSection] | None:
-        """The reference sensor, with a stated calibration, and its name, or None."""
+        """The name and the section of the reference sensor, whose calibration is stated; None without a reference."""
         return next(((name, s) for name, s in self.sensors.items() if s.role == "reference"), None)
 
 

@@ -36,7 +36,7 @@ class Judged(Protocol):
 
 
 def find_conformity_limit(checks: Iterable[Judged], sensor: str, quantity: str, parameter: Parameter) -> float | None:
-    """Return the limit of conformity that judges a parameter of a sensor's quantity, or None."""
+    """Return the limit of conformity that judges a parameter of a sensor's quantity; None if no limit does."""
     subject = "conformity", sensor, quantity, parameter
     limits = ((check.means, check.limit) for check in checks)
     return next(

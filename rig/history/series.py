@@ -247,10 +247,11 @@ def time_of(past: Past) -> datetime:
 def days_to_limit(
     line: FittedModel, last_days: float, expanded: float, max_deviation: float, nominal: float
 ) -> int | None:
-    """Return the days after the last result until |value − nominal| + U reaches `max_deviation`, or None.
+    """Return the days after the last result until |value − nominal| + U reaches `max_deviation`.
 
-    None means more than ten years. `line` is value = c₀ + c₁ t with t in days, as is `last_days`. U combines the line's
-    uncertainty at that time, the scatter between runs, and the `expanded` uncertainty of the last result.
+    Return None if that takes more than ten years. `line` is value = c₀ + c₁ t with t in days, as is `last_days`. U
+    combines the line's uncertainty at that time, the scatter between runs, and the `expanded` uncertainty of the last
+    result.
     """
     ahead = np.arange(MAX_HORIZON_DAYS + 1.0)
     value, std = line.predict(np.stack([np.ones_like(ahead), last_days + ahead], axis=-1))

@@ -45,7 +45,7 @@ class Selection:
 class Past:
     """A calibration of the history. `id` is its number, `run_id` the number of its run.
 
-    `voided` is the reason why it is void, or None.
+    `voided` is the reason why it is void, None if it is valid.
     """
 
     id: int

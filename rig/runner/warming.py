@@ -110,7 +110,7 @@ class Warming:
         return readings_c if len(readings_c) == len(self.names) else {}
 
     def find_missing(self) -> str | None:
-        """Return the part of the temperature range that is not covered yet, in words, or None."""
+        """Return the part of the temperature range that is not covered yet, in words; None if all is covered."""
         return self.course.missing()
 
     def begin_waiting(self) -> None:

@@ -77,7 +77,7 @@ def _is_usual(address: "HistoryAddress") -> bool:
 def remember_certificate(
     folder: Path, result: str, certificate: "IssuedCertificate", history: str | None = None
 ) -> str | None:
-    """Enter the certificate of the run of `folder`, with result.json `result`; return why this failed, or None.
+    """Enter the certificate of the run in `folder`, whose result.json is `result`; return why this failed, if it did.
 
     The history is `history`, or if None the user's own, never one that the folder's configuration names, because the
     folder may come from anywhere.

@@ -64,7 +64,7 @@ def opening_text(control: str) -> str:
 
 
 def find_incident(words: str) -> Incident | None:
-    """Return the incident that `words` name, or None. `slider` takes any whole percentage up to 100."""
+    """Return the incident that `words` name, None if they name none. `slider` takes any whole percentage up to 100."""
     words = " ".join(words.lower().split())
     if (slider := SLIDER.fullmatch(words)) is not None and int(slider[1]) <= 100:
         return _slider(int(slider[1]))

@@ -110,7 +110,7 @@ class RigBench:
         return next((past.words for past in calibrations if (past.day, past.verdict) == (day, "pass")), None)
 
     def find_other_serial_number(self, chip: Chip, serial: str) -> str | None:
-        """Return the newest other serial number that the history has for this board, or None."""
+        """Return the newest other serial number that the history has for this board; None if it has no other."""
         config = self._configure(serial).loaded.config
         own_numbers = {sensor.serial_number for sensor in config.all_sensors.values()}
         parts = {config.sensors[name].part for name in self._named}

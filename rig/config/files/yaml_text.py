@@ -56,7 +56,7 @@ class Document:
 
 
 def first_control_character(text: str) -> str | None:
-    """Return the first control character (escape, carriage return, text direction …), or None."""
+    """Return the first control character (escape, carriage return, text direction …); None if there is none."""
     return next((character for character in text if unicodedata.category(character) in INVISIBLE_CATEGORIES), None)
 
 

@@ -107,7 +107,7 @@ class LineTemperatureSection(Section):
 
     @property
     def stated(self) -> StatedTemperatureSection | None:
-        """The stated temperature, or None."""
+        """The stated temperature, None if it is not stated."""
         if self.stated_c is None:
             return None
         return StatedTemperatureSection(stated_c=self.stated_c, stated_within_k=self.stated_within_k)

@@ -73,7 +73,7 @@ def _end_with_parent() -> None:
 
 
 def _limit(limits: Mapping[str, Any]) -> int | None:
-    """Limit this process's resources; return the largest length, bytes, of a file that it may write, or None."""
+    """Limit this process's resources; return the largest file, bytes, that it may write, None on Windows."""
     try:
         import resource
     except ModuleNotFoundError:  # Windows

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 class IssuedCertificate:
     """An issued certificate.
 
-    `issued`: the day of issue; `replaces`: the number of the certificate that this one amends, or None; `marks`: the
+    `issued`: the day of issue; `replaces`: the number of the certificate that this one amends, if any; `marks`: the
     text printed across its pages, empty if there is none; `files`: the names and SHA-256 of its files.
     """
 

@@ -52,7 +52,7 @@ class Characteristic:
     """A quantity of a sensor other than scale factor and bias, with a number for each of `labels` in an entry.
 
     - `units`: returns the units for the quantity that the sensor measures.
-    - `read`: returns the numbers in an entry, or None.
+    - `read`: returns the numbers in an entry; None if the entry does not have them.
     - `series`: the names of its numbers in a history; None if a history does not store it, which `exempt` explains.
     - `exempt`: the forms of output that do not show it, each with the reason.
     - `remark`: returns the remark before ± U in the digital certificate, for an entry.

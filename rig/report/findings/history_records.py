@@ -28,7 +28,8 @@ class Parameter:
     """One number of a calibration.
 
     `std_combined` is None if only the uncertainty due to noise is known. `max_deviation`: the run's limit of the
-    deviation from nominal, or None. `coverage_factor`: the coverage factor of U for its degrees of freedom.
+    deviation from nominal, None without a limit. `coverage_factor`: the coverage factor of U for its degrees of
+    freedom.
     """
 
     name: str

@@ -119,7 +119,7 @@ class ResultKind(Generic[EntryT]):
     - measured: builds the content of the digital certificate from a finding and the reversal entries, by sensor.
     - standard: the statement of traceability in both certificates.
     - corrected: builds the correction of readings for exports; None for a reference.
-    - unexplained: builds the residuals of a finding's means for pictures, or None.
+    - unexplained: builds the residuals of a finding's means for pictures; returns None without residuals.
     - templates: the folder of the block's template.
     - unsolved: yields the reasons why sensors have no solution.
     - in_short: yields lines for the end of a run, if the kind has no row.

@@ -21,7 +21,7 @@ class KvhInfo:
     - messages, lost: numbers of received and lost messages.
     - rotation, acceleration_g (3,): means over the messages, in the instrument's units.
     - status: the status in the messages, None without messages.
-    - problem: why no stream was received, or None.
+    - problem: why no stream was received; None if one was.
     """
 
     sensor: str

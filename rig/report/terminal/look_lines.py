@@ -99,7 +99,7 @@ class TriedSolutions:
     """The solutions that were tried for a log.
 
     - `columns`: the file of its column map, if any.
-    - `at_rest`: why it is not a log at rest, or None.
+    - `at_rest`: why it is not a log at rest; None if it is one.
     - `up`: the axis that points upwards; `finds_clock`: whether the reference has a clock of its own.
     - `turns`, `attitudes`: the trials, None if none was made.
     """

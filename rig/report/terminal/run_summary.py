@@ -44,8 +44,8 @@ def ending(
 ) -> Iterator[str]:
     """Yield the lines at the end of a run, the verdict last, at most `width` long except paths and commands.
 
-    `since` has the comparison with the last calibrations in lines; `folder` is the run's folder for remedies, or None;
-    `everything` is the command that prints all details.
+    `since` has the comparison with the last calibrations in lines; `folder` is the run's folder, which remedies name,
+    None without a folder; `everything` is the command that prints all details.
     """
     items = [*_items(result)]
     summary = "; ".join([*_describe_values(items), _count_passed(result)])

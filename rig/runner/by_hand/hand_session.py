@@ -173,7 +173,7 @@ class HandSession:
         self._ask(self._next(now, face), wrong)
 
     def _doubt_earlier_moves(self, now: SessionProgress) -> Fault | None:
-        """Return the Fault of the accepted moves if the last ones all contradict them, or None.
+        """Return a Fault if all of the last moves contradict the accepted ones, which may then be wrong; else None.
 
         A wrong move among the first ones is not detected, because nothing contradicts it yet.
         """
@@ -197,7 +197,7 @@ class HandSession:
         self._judged_s = rest.end_s
 
     def _not_closed(self, now: SessionProgress) -> Fault | None:
-        """Return the fault of a whole turn that ends too far from its start, or None."""
+        """Return a fault if a whole turn ends too far from its start, else None."""
         if not now.moves or self._request is None:
             return None
         last, whole_rad = now.moves[-1], 2 * np.pi

@@ -100,7 +100,7 @@ def is_nameless(name: str) -> bool:
 
 
 def find_axis(name: str) -> tuple[str, str] | None:
-    """Return the sensor, "g", "a" or "m", and the axis that a simplified heading names, or None."""
+    """Return the sensor ("g", "a" or "m") and the axis that a simplified heading names; None if it names no axis."""
     column = match_names((name,)).get(0, "")
     return (column[0], column[1]) if len(column) == 2 else None
 

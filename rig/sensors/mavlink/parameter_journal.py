@@ -82,7 +82,7 @@ class ParameterChange:
 
 
 def find_change(autopilot_id: str) -> ParameterChange | None:
-    """Return the autopilot's change in the journal, or None. Raise Refused `not_an_autopilot_file`."""
+    """Return the autopilot's change in the journal; None without one. Raise Refused `not_an_autopilot_file`."""
     path = _journal_path(autopilot_id)
     return read_change(path) if path.exists() else None
 

@@ -68,7 +68,7 @@ _SAFETY_PROBLEMS: dict[int, Problem] = {
 
 
 def readiness(state: ArmState) -> Problem | None:
-    """Return the first reason why the arm cannot move as planned, or None."""
+    """Return the first reason why the arm cannot move as planned; None if it can."""
     if safety := _safety_problem(state):
         return safety
     if state.robot_mode != RobotMode.RUNNING:

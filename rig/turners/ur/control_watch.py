@@ -83,7 +83,7 @@ class ControlWatch:
                     connection.close()
 
     def _problem(self, remote: ControlMode) -> Problem | None:
-        """Return the problem that the control mode shows, or None."""
+        """Return the problem that the control mode shows; None if there is no problem."""
         if remote is False:
             return local_control_during_run(f"the pendant of the arm at {self._host} was switched to local control")
         if self._is_x and remote is None and self._has_lost_primary_alone():

@@ -41,7 +41,7 @@ def version_text(version: tuple[int, ...]) -> str:
 
 
 def identify_model(report: ArmReport) -> str | None:
-    """Return the maker's name of the arm that the controller reports, or None.
+    """Return the maker's name of the arm that the controller reports; None if the arm is unknown.
 
     If the controller does not report the arm's type, the geometry or the dashboard's name decides.
     """

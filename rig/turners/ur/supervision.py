@@ -40,9 +40,10 @@ class Supervision:
         self._limited_since_s: float | None = None
 
     def judge(self, state: ArmState) -> Problem | None:
-        """Return why the arm cannot continue, or None; the safety bits that explain a stop may come one packet later.
+        """Return why the arm cannot continue; None if it can.
 
-        An interruption ends our program; a program that runs soon after belongs to another client.
+        The safety bits that explain a stop may come one packet later than the stop. An interruption ends our program; a
+        program that runs soon after belongs to another client.
         """
         if self.stage is ControlStage.LOOKING:
             return None

@@ -76,7 +76,7 @@ class Receiver:
             yield packet
 
     def _next(self) -> ServoPacket | None:
-        """Return the first complete packet in the buffer, or None; drop it and the bytes before it from the buffer."""
+        """Return the first complete packet, and drop it and the bytes before it from the buffer; None if it has none."""
         buffer = self._buffer
         while True:
             start = buffer.find(HEADER)

@@ -25,9 +25,10 @@ OWNERS = (
 
 
 def find_free_half(host: str, version: tuple[int, ...], timeout_s: float) -> int | None:
-    """Return the half of the registers, `LOWER_FIRST` or `UPPER_FIRST`, that is free at the controller `host`, or None.
+    """Return the half of the registers that is free, `LOWER_FIRST` or `UPPER_FIRST`; None if neither half is free.
 
-    `version`: the controller's software. Nothing remains reserved. Raise `OSError` without an answer in `timeout_s`.
+    `host`, `version`: the controller and its software. Nothing remains reserved. Raise `OSError` without an answer in
+    `timeout_s`.
     """
     with socket.create_connection((host, PORT), timeout_s) as connection:
         deadline_s, received = time.monotonic() + timeout_s, bytearray()

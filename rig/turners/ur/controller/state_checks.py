@@ -59,7 +59,7 @@ def _is_possible(state: ArmState) -> bool:
 
 
 def impossible_payload(mass_kg: float, centre_m: Sequence[float]) -> Problem | None:
-    """Return the problem of a payload that is not finite, or None."""
+    """Return the problem of a payload that is not finite; None for a finite payload."""
     numbers = (mass_kg, *centre_m)
     return None if all(map(math.isfinite, numbers)) else _impossible(f"its payload is {mass_kg:g} kg at {centre_m} m")
 
@@ -74,9 +74,10 @@ def impossible_motion(before: ArmState, after: ArmState) -> Problem | None:
 
 
 def clock_step(before_s: float, after_s: float, period_s: float, missed_s: float) -> Problem | None:
-    """Return the problem of a time `after_s` that is not a whole number of periods after `before_s`, or None.
+    """Return a problem unless the time `after_s` is a whole number of periods after `before_s`.
 
-    `missed_s` is the longest recent gap, on the controller's clock, in which states may have been lost.
+    `missed_s` is the longest recent gap, on the controller's clock, in which states may have been lost. A longer step
+    is a problem too.
     """
     step_s = after_s - before_s
     step_unit_s = period_s if _divides(period_s) else CYCLE_S

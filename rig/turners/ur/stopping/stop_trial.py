@@ -21,7 +21,7 @@ MAX_END_S = 2.0
 
 
 def stop_trial(host: str, api: RobotApi, shows: Callable[[RuntimeState, float], bool]) -> Problem | None:
-    """Run a program that moves nothing and stop it; return why the primary interface could not stop it, or None.
+    """Run a program that moves nothing and stop it; return why the primary interface could not, None if it could.
 
     `shows(state, timeout_s)` waits for this state of the arm's program and returns whether it occurred.
     """

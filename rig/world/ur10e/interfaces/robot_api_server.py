@@ -204,7 +204,7 @@ class RobotApiSession:
 
 
 def _read_word(body: bytes, key: str) -> str | None:
-    """Return the text under a key of a JSON document, or None."""
+    """Return the text under a key of a JSON document; None if the key has no text."""
     try:
         word = json.loads(body)[key]
     except (ValueError, TypeError, KeyError, RecursionError):
