@@ -99,7 +99,7 @@ def _unlock(robot: Robot) -> None:
 
 
 def _free(robot: Robot) -> None:
-    """Release the registers that a fieldbus has claimed; those that the rig has claimed remain so."""
+    """Release the registers that a fieldbus has claimed, but not those that the rig has claimed."""
     for name in [name for name, owner in robot.claims.items() if owner is FIELDBUS]:
         del robot.claims[name]
 

@@ -73,7 +73,7 @@ class ClientConnection:
             self.read()
 
     def read(self) -> bool:
-        """Read the client's bytes; close the connection if the client has. Return whether more bytes may follow."""
+        """Read the client's bytes; close the connection if the client has closed it. Return whether more may come."""
         try:
             data = self._peer.recv(65536)
         except BlockingIOError:

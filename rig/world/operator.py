@@ -25,7 +25,7 @@ ORIENTATION = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 class SimulatedOperator:
-    """A `MotionSource`. The same instructions at the same ticks give the same motions."""
+    """The simulated operator as a `MotionSource`. The same instructions at the same ticks give the same motions."""
 
     ideal = False
     waiting = False  # the hand moves by itself

@@ -141,7 +141,7 @@ def _read_slots(
 ) -> list[BoardSlot]:
     """Return the command's sensors on the board, each with its stored calibration, if any.
 
-    `sensor` names the only one, or is None for all `among` the candidates. Raise Refused `no_such_sensor`,
+    `sensor` names the only one; if it is None, all sensors in `among` are meant. Raise Refused `no_such_sensor`,
     `sensor_missing`.
     """
     among = {name: section for name, section in among.items() if section.on_board}

@@ -36,7 +36,7 @@ def add(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     """Print the KVH 1775 at the given port, or each instrument in the configuration; return 2 if one has a problem.
 
-    Raise Refused `no_kvh_section` for a configuration without any.
+    Raise Refused `no_kvh_section` for a configuration without a KVH 1775.
     """
     from rig.commands.laboratory.own_address import load_at_own_address
     from rig.report.terminal.kvh_info import print_kvh_info

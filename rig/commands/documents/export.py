@@ -42,12 +42,12 @@ def run(options: Namespace) -> int:
 
 
 def export_files(options: Namespace) -> list[Path]:
-    """Write readings of the first movement with its motion, or the calibrations of a passed run, into `--out`.
+    """Write readings and motion of a run's first movement, or a passed run's calibrations, into `--out`.
 
-    `--at-temperature`: a temperature in °C, and the run of `bias_drift` with the slopes. Return the files. Raise
-    Refused `report_folder`, `bad_option`, `missing_extra`, and what `refuse_links` raises; for readings also what
-    `open_run`, `read_log` and `export_recordings` raise; for calibrations what `read_passed_result`, `at_temperature`
-    and the format raise.
+    `--at-temperature` has a temperature, °C, and the run of `bias_drift` whose slopes move the biases to it. Return the
+    files. Raise Refused `report_folder`, `bad_option`, `missing_extra`, and what `refuse_links` raises; for readings
+    also what `open_run`, `read_log` and `export_recordings` raise; for calibrations what `read_passed_result`,
+    `at_temperature` and the format raise.
     """
     from rig.report.exports.exported_recording import export_recordings
 
@@ -87,7 +87,8 @@ def export_files(options: Namespace) -> list[Path]:
 def _read_recordings(run: Path, columns: Path | None) -> "Sequence[RunData]":
     """Return the recordings of a run, or of a log of another program.
 
-    A folder of `rig record` counts as logs, not as a run. Raise Refused `bad_option`, and as both readers do.
+    A folder of `rig record` counts as logs, not as a run. Raise Refused `bad_option`, and the errors of the readers of
+    runs and of logs.
     """
     from rig.observation.external.from_files import read_log
     from rig.observation.formats.sample_files import is_in_format

@@ -158,7 +158,7 @@ def _judge(
 def find_signed_holder(
     name: str, content: bytes, look: "FileInspection", looks: "Mapping[Path, FileInspection]"
 ) -> tuple[str | None, tuple[Refused, ...]]:
-    """Return the signed file that contains an unsigned file, or None, and the problems of its signer.
+    """Return the name of the signed file that contains an unsigned one, if any, and the problems of its signer.
 
     The unsigned file may be attached under its own or under another name.
     """

@@ -86,7 +86,7 @@ def show(options: Namespace) -> int:
 
 
 def _find_shown(history: History, named: str) -> list[Past]:
-    """Return the calibration of this number, or those of the last run of this serial number.
+    """Return the calibration with the number `named`, or those of the last run of the serial number `named`.
 
     Raise Refused `not_in_history`.
     """

@@ -79,6 +79,6 @@ def _move_turner(config: RigConfig, text: str, host: str) -> Iterator[str]:
 
 
 def _move_ports(config: SensorsConfig, host: str) -> Iterator[str]:
-    """Yield the overrides of the configuration's ports for another host."""
+    """Yield the overrides that move the ports of the configuration to `host`."""
     for key, port in config.ports.items():
         yield f"{key}=socket://{host}:{urlsplit(port).port}"

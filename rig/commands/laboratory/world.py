@@ -22,7 +22,8 @@ def add(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     """Run only the world of a configuration, until Ctrl-C; return its exit status.
 
-    Raise Refused `only_on_linux`, as `load` does, with `--faults` as `run_simulated_laboratory`; Fault `world_ended`.
+    Raise Refused `only_on_linux`, and what `load` and, with `--faults`, `run_simulated_laboratory` raise; Fault
+    `world_ended`.
     """
     refuse_unless_linux("the simulated laboratory")
     from rig.config.load import load

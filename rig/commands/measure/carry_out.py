@@ -100,7 +100,7 @@ def _describe_run(folder: Path, configured: Configured, page: PageWish | None) -
 
 
 def _storing_command(folder: Path, configured: Configured) -> str | None:
-    """Return the command that stores the run's calibration on its board; None without a board or if it is simulated."""
+    """Return the command that stores the run's calibration on its board; None without a real board."""
     if configured.loaded.simulated or not configured.loaded.config.parts_on_board:
         return None
     return f"rig board calibration write {shlex.quote(str(folder / CONFIG))} {shlex.quote(str(folder))}"

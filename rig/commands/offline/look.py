@@ -90,7 +90,7 @@ def _print(
     stated: "ColumnMap | None",
     named: Path | None,
 ) -> None:
-    """Print the files and the commands that can use them. Enter the gyroscope's convention into `columns`."""
+    """Print the files and the commands that can use them. Enter the quaternions' `convention` into `columns`."""
     from rig.analysis.log_contents import find_pair
     from rig.data.quantity import RATE
     from rig.report.terminal.look_lines import describe_convention, describe_file, describe_solutions

@@ -80,7 +80,7 @@ class RigBench:
     """A bench with the rig of a configuration.
 
     - control: the address of its simulated laboratory, None for a real one.
-    - ahead: connects the turner.
+    - ahead: connects the turner for the next run in advance.
     - truth_file: where the simulated laboratory writes its truth.
     - begun: the folders of the runs that began in this laboratory.
     """

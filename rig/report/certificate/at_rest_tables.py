@@ -43,7 +43,7 @@ class DriftRow:
 
 
 def acceleration_rows(entry: AccelerometerEntry) -> list[AxisRow]:
-    """Return an accelerometer's axes with U; the bias in m/s² and in thousandths of the stated gravity."""
+    """Return a row with U for each accelerometer axis; biases are in m/s² and in thousandths of the stated gravity."""
     return rows_of(entry.scale, entry.bias_m_s2, entry.budget.expanded, too=1000 / entry.gravity_m_s2)
 
 

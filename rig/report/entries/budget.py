@@ -30,7 +30,7 @@ def budget_entry(budget: Budget) -> BudgetEntry:
 
 
 def bias_process_entry(fit: VectorFit) -> BiasProcessEntry:
-    """Return the fitted bias process of the rests and the time over which the bias was averaged."""
+    """Return the entry of the bias process fitted to the rests, with the time over which the bias was averaged."""
     return entry(
         BiasProcessEntry,
         fit.bias,
@@ -40,7 +40,7 @@ def bias_process_entry(fit: VectorFit) -> BiasProcessEntry:
 
 
 def clock_entry(check: ClockCheck) -> ClockEntry:
-    """Return the error of the controller's clock and its comparisons with other clocks."""
+    """Return the entry of the controller's clock: its error, and its comparisons with other clocks."""
     return entry(
         ClockEntry, check, comparisons=[entry(ClockComparisonEntry, comparison) for comparison in check.comparisons]
     )

@@ -91,7 +91,7 @@ def rates_in_attitudes(sensor: ExternalResult) -> AttitudesEntry | None:
 
 
 def angles_entry(sensor: ExternalResult) -> AnglesEntry | None:
-    """Return the stated accuracy of the turning angles; None for a gyroscope calibrated from mean rates."""
+    """Return the entry of the turning angles' stated accuracy; None for a gyroscope calibrated from mean rates."""
     if sensor.turned is None or sensor.gyroscope is None:
         return None
     turns = sensor.turned.turns

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 def sensor_entry(
     result: SensorResult, role: Role = "calibrate", board: "Agreement | None" = None, **more: Any
 ) -> GyroscopeEntry:
-    """Return scale, bias and covariance by the chosen estimator, and the other estimators' solutions or errors.
+    """Return a gyroscope's entry: the chosen estimator's solution, and the others' solutions or errors.
 
     `board` is the comparison with the board's own solution, `more` are further fields. Fields without a value are left
     out.
@@ -109,7 +109,7 @@ def _vector_or_error(result: SensorResult) -> VectorEntry | ErrorEntry:
 
 
 def vector_entry(outcome: "vector_model.VectorSolution | TurnedSolution", **more: Any) -> VectorEntry:
-    """Return the vector model's solution with the angles between the axes, and the further fields `more`."""
+    """Return the entry of the vector model's solution, with the angles between the axes and the fields `more`."""
     angles = np.sqrt(np.diag(outcome.angles_covariance_rad2))
     sensitivity: dict[str, Any] = {}
     if outcome.g_sensitivity is not None and outcome.g_sensitivity_covariance is not None:

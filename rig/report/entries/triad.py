@@ -47,7 +47,7 @@ def triad_entry(
     residuals: tuple[Array, Array],
     **more: Any,
 ) -> EntryT:
-    """Return scale, bias and covariance, the solutions of other methods, the dwells, and the fields of `more`.
+    """Return a sensor's entry: scale, bias, covariance, other methods' solutions, dwells, and the fields `more`.
 
     `residuals` are two arrays (N, 3): the residuals of the dwells and their expected standard deviations.
     """

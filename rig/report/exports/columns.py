@@ -10,7 +10,7 @@ from rig.estimation.arrays import Array
 
 @dataclass(frozen=True, slots=True)
 class ExportTable:
-    """Columns (n,) by name, which contains the unit, and their `meaning`."""
+    """A table: columns (n,) by name, which includes the unit, and the `meaning` of the table in words."""
 
     name: str
     columns: Mapping[str, Array]

@@ -65,7 +65,7 @@ class ExportedCalibrations:
         return tuple(printable(f"{term.whose}, {term.name}") for term in terms)
 
     def origin(self, sensor: SensorCorrection) -> Iterator[str]:
-        """Yield the sensor, the time and temperature of its calibration, and the program."""
+        """Yield lines that name the sensor, the time and temperature of its calibration, and the program."""
         provenance = self.result.provenance
         temperature = "" if sensor.temperature_c is None else f" at {sensor.temperature_c:.1f} degC,"
         yield printable(f"{sensor.sensor}: {sensor.part} {sensor.serial_number},{temperature} {provenance.started_utc}")

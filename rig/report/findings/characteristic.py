@@ -131,9 +131,10 @@ def terms(
 
 
 def read_fields(what: str, suffix: str, sign: int = 1) -> Callable[[Any], UncertainNumbers | None]:
-    """Return a reader of an entry's fields `what_suffix`, `what_std_suffix` and `what_degrees_of_freedom`.
+    """Return a reader of the fields `<what>_<suffix>`, `<what>_std_<suffix>` and `<what>_degrees_of_freedom`.
 
-    The reader also looks into the entry's vector model. It flattens a matrix by rows and multiplies values by `sign`.
+    The reader looks into an entry and into the entry's vector model. It flattens a matrix by rows and multiplies values
+    by `sign`.
     """
 
     def read(entry: Any) -> UncertainNumbers | None:

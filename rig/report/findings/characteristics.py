@@ -1,7 +1,7 @@
 """All characteristics of the rig's own kinds of results. A new characteristic is a row here, for all outputs.
 
 A row has a name, units, a reader of the numbers, names in a history, and the outputs that do not show it, with reasons.
-All other outputs show it: terminal, page, notebook, both certificates and exports.
+All other outputs show the characteristic: terminal, page, notebook, both certificates and exports.
 """
 
 from collections.abc import Callable, Mapping

@@ -106,7 +106,7 @@ def scale_and_bias(
 ) -> Iterator[Parameter]:
     """Yield the mean scale factor, then scale factor and bias of each axis.
 
-    The mean's uncertainty includes the covariances of the axes; its coverage factor is the largest of any axis.
+    The mean's uncertainty includes the covariances of the axes; its coverage factor is the largest of the three axes.
     """
     from rig.data.meaning import JUDGED_PARAMETERS, find_conformity_limit
 

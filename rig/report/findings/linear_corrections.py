@@ -5,9 +5,9 @@ A reading m follows from the true value in SI units, with matrix F, offset c and
     gyroscope        m = F ω + G a + c,    for the rate ω and the specific force a, which at rest points upwards
     any other triad  m = F s + c           for the specific force or flux density s
 
-The rig's bias b of a gyroscope is −c. A gyroscope's F, ω and a are in the right-angled frame nearest to its axes, whose
-rotation is the vector model's `mounting`. Without a solution of the vector model F is K⁻¹, the inverse of the rig's
-matrix of scale factors, and G is unknown.
+The rig's bias b of a gyroscope is −c. A gyroscope's F, ω and a are in the right-angled frame nearest to its axes; the
+vector model's `mounting` rotates from the flange into this frame. Without a solution of the vector model F is K⁻¹, the
+inverse of the rig's matrix of scale factors, and G is unknown.
 """
 
 from collections.abc import Sequence

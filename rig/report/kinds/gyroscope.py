@@ -182,7 +182,7 @@ def _angle_lines(sensor: GyroscopeEntry) -> Iterator[str]:
 
 
 def _attitude_lines(attitudes: AttitudesEntry | None, clocks: Iterable[TimeBaseEntry]) -> Iterator[str]:
-    """Yield the results, other than scale and bias, from a file's attitudes."""
+    """Yield lines on the results, other than scale and bias, from a file's attitudes."""
     if attitudes is None:
         return
     for clock in clocks:

@@ -72,7 +72,7 @@ def history_record(finding: Finding[Any], document: ResultDocument) -> HistoryRe
 
 
 def tables(title: str, quantity: Quantity, entry: CalibratedEntry) -> Iterator[Table]:
-    """Yield scale and bias of each axis ± U, and the uncertainty budget."""
+    """Yield a table of scale and bias of each axis ± U, and a table of the uncertainty budget."""
     budget, expanded = entry.budget, expand_uncertainties(entry.budget, entry.covariance)
     yield scale_and_bias_table(
         title, quantity, entry.scale, bias_of(quantity, entry), expanded, heading=heading_for(budget)

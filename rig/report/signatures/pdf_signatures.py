@@ -115,7 +115,7 @@ def _inspect_signature(
 
 
 def _check_authorities(name: str, signature: Any, trust: Trust) -> Iterator[Refused]:
-    """Yield problems of the authorities' certificates in the container, which the signature does not cover."""
+    """Yield problems of the authorities' certificates, because the signature does not cover these certificates."""
     for certificates in certificates_with(signature.pkcs7_content) if trust.certificates else ():
         for authority in find_unvouched(certificates, trust):
             yield authority_not_trusted(name, authority.subject.rfc4514_string())

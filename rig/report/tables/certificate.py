@@ -63,7 +63,7 @@ def pair(value: float, uncertainty: float) -> Pair:
 
 
 def axis_rows(sensor: GyroscopeEntry) -> list[AxisRow]:
-    """Return a gyroscope's axes with U from the budget; without one, with the standard deviation of the noise."""
+    """Return a row for each gyroscope axis, with U from the budget or else with the noise's standard deviation."""
     return rows_of(sensor.scale, sensor.bias_rad_s, _widths(sensor), too=degrees_of(sensor)[1])
 
 

@@ -12,18 +12,18 @@ QUANTITIES = ("scale factors", "biases")
 
 
 def factor_note(budget: BudgetEntry) -> str:
-    """Return the note on U with k, if k is the same for all printed values."""
+    """Return the note on U: the coverage factor k, if it is the same for all values, or where k is stated."""
     printed = {f"{factor:.2f}" for factor in budget.coverage_factors}
     return f"k\u00a0=\u00a0{_short(printed.pop())}" if len(printed) == 1 else "k as stated below"
 
 
 def joint_factor(budget: BudgetEntry) -> float:
-    """Return the factor of the ellipsoid that contains all six values at once with 95 %."""
+    """Return the factor of the ellipsoid that contains all six values at once with a probability of 95 %."""
     return find_ellipsoid_factor(len(budget.std), budget.effective_dof)
 
 
 def coverage_sentence(budget: BudgetEntry) -> str:
-    """Return the statement on k by EA-4/02 M:2022, 6.4, or annex E for few degrees of freedom."""
+    """Return the statement on k according to EA-4/02 M:2022, 6.4, or to annex E for few degrees of freedom."""
     begins = (
         "The reported expanded uncertainty of measurement is the standard uncertainty of measurement multiplied by the "
         "coverage factor k"

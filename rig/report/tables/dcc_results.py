@@ -221,7 +221,7 @@ def _ellipsoid_factor(counted: Sequence[Freedom]) -> float:
 def _wide_result(
     name: str, statement: str, labels: Sequence[str], values_and_stds: ValuesAndStds, unit: str
 ) -> Element:
-    """Return values with U, from their standard deviations and degrees of freedom."""
+    """Return the element of a result: values with U, computed from standard deviations and degrees of freedom."""
     numbers, stds, dof = values_and_stds
     words = f"{statement}, {factor_words(dof)}."
     return _result(name, words, real_list(labels, numbers, [unit], expanded=expanded(stds, dof)))

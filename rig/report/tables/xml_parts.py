@@ -72,9 +72,9 @@ def real_list(
     expanded: Expanded | None = None,
     region: tuple[Sequence[Sequence[float]], float] | None = None,
 ) -> Element:
-    """Return values with U and its coverage, or with a covariance matrix and the factor of their joint region.
+    """Return an element of a list of values, with `expanded` uncertainties or the covariance of a joint `region`.
 
-    A single unit applies to all values.
+    `region` is the covariance matrix and the region's coverage factor. A single unit applies to all values.
     """
     uncertainty = covered = None
     if expanded is not None:

@@ -183,7 +183,10 @@ def _counts(plan: Plan) -> str:
 
 
 def _limits_table(what: str, by_sensor: "Mapping[str, Sequence[DetectionLimit]]") -> Table:
-    """Return a row for each fault, a column for each sensor; a dash if no check of the sensor detects it."""
+    """Return a table with a row for each fault and a column for each sensor; the heading names `what` has the fault.
+
+    A dash means that no check of the sensor detects the fault.
+    """
     from rig.report.words.detection_limit_words import size_words
 
     table = Table(box=SIMPLE)

@@ -29,7 +29,7 @@ class Word:
         return tuple(name.partition(" = ")[0] for name in self.names.split(", "))
 
     def plain_meaning(self, *, with_pages: bool) -> str:
-        """Return the meaning without Markdown, for terminals; `with_pages` adds the paths of its pages."""
+        """Return the meaning without Markdown, for terminals; `with_pages` adds the paths of linked pages."""
         return LINK.sub(r"\1: docs/\2" if with_pages else r"\1", self.meaning).replace("`", "")
 
 

@@ -57,7 +57,7 @@ def warmth(when: ConditionsEntry, use: str = "") -> dict[str, float | None]:
 
 
 def label_source(use: str) -> str:
-    """Return the label that `warmth` writes for this `use`, followed by the temperature's source."""
+    """Return a label that `warmth` has made (`use`), with the temperature's source."""
     return use if use.endswith(STATED_SUFFIX) else f"{use}, by its own thermometer"
 
 

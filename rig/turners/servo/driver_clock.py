@@ -19,7 +19,10 @@ class Clock(Protocol):
         """Wait for an event. Return whether the event occurred in time."""
 
     def wait_for(self, changed: threading.Condition, done: Callable[[], bool], timeout_s: float) -> bool:
-        """Wait until `done` is true, which is tested at each notice of the locked `changed`; return its last value."""
+        """Wait until `done()` is true; return its last value.
+
+        It is tested at each notification of `changed`, which the caller has locked.
+        """
 
 
 class HostClock:

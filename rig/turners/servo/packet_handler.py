@@ -99,8 +99,8 @@ class Bus:
     def read_bytes(self, register: Register) -> bytes:
         """Read a register's bytes. Raise ReplyLost, InstructionDenied, PortGone.
 
-        The packet handler's `readTxRx` takes the requested number of bytes from a reply of any length, so it would take
-        the checksum of a late acknowledgement for data.
+        The packet handler's `readTxRx` is not used, because it takes the requested number of bytes from a reply of any
+        length, and so would take the checksum of a late acknowledgement for data.
         """
         with self._failing():
             result = self._packets.readTx(self._port, self._id, register.address, register.size)

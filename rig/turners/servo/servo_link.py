@@ -30,7 +30,10 @@ class JobCancelled(BusError):
 
 
 class ServoLink:
-    """A thread that polls `bus` every `period_s` and calls `on_state` and `on_problem`, even after a problem."""
+    """A thread that polls `bus` every `period_s`, passing states to `on_state` and problems to `on_problem`.
+
+    The thread continues after a problem.
+    """
 
     def __init__(
         self,
@@ -157,7 +160,7 @@ class ServoLink:
             self._fail(hardware_problem(self._error_bits))
 
     def _fresh(self, state: ServoState) -> bool:
-        """Return whether a reply is current by the servo's own clock, or is the latest of many after a restart."""
+        """Return whether a reply is current by the servo's clock; after many contradictions, trust the newest reply."""
         before = self._latest
         if state.took_s > MAX_TRANSACTION_S:
             return False

@@ -54,7 +54,7 @@ class SimulatedTruth:
         return mean
 
     def depends_on_speed(self, name: str) -> bool:
-        """Return whether the speed of two opposite rotations affects the scale factors that follow from them."""
+        """Return whether the scale factors between two opposite rotations depend on the rotations' speed."""
         return self._world.sensors[name].nonlinearity_odd_per_rad_s != 0
 
     def _rates(self, name: str, windows_s: Windows, rate_rad_s: float) -> np.ndarray:

@@ -201,7 +201,7 @@ class SimulatedKvh1775:
 
     # -- commands ------------------------------------------------------------------------------------------------
     def _obey(self, command: str) -> None:
-        """Carry out a command in the present mode; ignore those of the other mode."""
+        """Carry out a command of the present mode; ignore a command of the other mode."""
         if command in ("?BIT", "?BIT,2") and not self.configuring:
             self._tests_due.append(6 if command == "?BIT" else 8)
         elif command == "=CONFIG,1":

@@ -1,8 +1,9 @@
 """The servo's profile generator: from the present angle and rate to a goal, in segments of constant acceleration.
 
-Source: ROBOTIS e-Manual, "What is the Profile" (profile_description.md). Velocity-based: a trapezoid, or a triangle,
-limited in speed and acceleration. Time-based: the whole move takes the time in Profile Velocity, and each of its ramps
-that in Profile Acceleration. A goal that comes during a move is approached from the present speed, without a stop.
+Source: ROBOTIS e-Manual, "What is the Profile" (profile_description.md). A velocity-based profile is a trapezoid, or a
+triangle, limited in speed and acceleration. In a time-based profile the register Profile Velocity has the duration of
+the whole move, and Profile Acceleration that of each ramp. A goal that comes during a move is approached from the
+present speed, without a stop.
 """
 
 from math import copysign, sqrt

@@ -97,7 +97,7 @@ class SimulatedServo:
         return self.drive.is_moving(time_s)
 
     def obey(self, packet: ServoPacket, time_s: float) -> bytes | None:
-        """Execute a packet on the bus and return the answer; None if it is for another servo or needs none."""
+        """Execute a packet and return the answer; None if the packet is for another servo or needs no answer."""
         if not self._powered or time_s < self._awake_s:
             return None
         if packet.is_valid:

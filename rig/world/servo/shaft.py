@@ -78,7 +78,7 @@ class Shaft:
         return start.rate_rad_s * (1.0 + self._ripple * cos(self._ripples * out)) / slope
 
     def encoder_at(self, time_s: float) -> float:
-        """Return the encoder's angle with counted revolutions, without resolution and noise, rad."""
+        """Return the encoder's angle, rad, with counted revolutions, before the effects of resolution and noise."""
         out = self.start_at(time_s).angle_rad - self._gap_at(time_s)
         return out + self._ripple / self._ripples * sin(self._ripples * out)
 

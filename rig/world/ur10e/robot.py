@@ -232,8 +232,8 @@ class Robot:
     def start_program(self, program: Program) -> None:
         """Play a program in place of the running one.
 
-        While the brakes are on, it is accepted but remains paused. If a program is paused, a new one only stops it
-        (Universal Robots Client Library, issue 123, observed with the maker's simulator).
+        While the brakes are on, the program is accepted but remains paused. If another program is paused, the new one
+        only stops that program (Universal Robots Client Library, issue 123, observed with the maker's simulator).
         """
         paused = self.runtime_state in (RuntimeState.PAUSING, RuntimeState.PAUSED)
         if self.runtime_state != RuntimeState.STOPPED:

@@ -1,8 +1,9 @@
 """Inertial motion of a body on the flange: angular rate, its derivative and specific force, propagated joint by joint.
 
 Luh, Walker, Paul, On-line computational scheme for mechanical manipulators, 1980, the outward recursion, for standard
-Denavit–Hartenberg frames. The base has the Earth's rate and the reaction to gravity, so gravity, Earth rate and
-Coriolis terms follow. A component may be a float or an array of shape (n,), the same for all components.
+Denavit–Hartenberg frames. The recursion begins with the base, which has the Earth's rate and the reaction to gravity,
+so the results include gravity, Earth rate and Coriolis terms. A component may be a float or an array of shape (n,), the
+same for all components.
 """
 
 from collections.abc import Sequence

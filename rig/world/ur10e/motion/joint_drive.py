@@ -84,7 +84,7 @@ class JointDrive:
     def advance(self, before: Sequence[Deflection], change_rad_s: Sequence[float]) -> tuple[Deflection, ...]:
         """Return the joints' deflections in the next tick, if their targets' rates change by `change_rad_s`.
 
-        `before` has the deflections in the last tick. Joints that are not deflected are left out of it and of the
+        `before` has the deflections in the last tick. Joints that are not deflected are left out of `before` and of the
         result.
         """
         if not self.yield_s2 or not (before or any(change_rad_s)):

@@ -53,7 +53,7 @@ class Errors:
 
 
 class JointErrors:
-    """Errors of all six joints. `step` records reversals and stops; `true_state` returns the true joints."""
+    """Errors of all six joints. `step` records reversals and stops; `true_state` returns the joints' true state."""
 
     def __init__(self, errors: Errors, random: Random) -> None:
         self._errors = errors

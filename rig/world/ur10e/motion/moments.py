@@ -78,7 +78,7 @@ def _frames(q: Array, links: Links) -> tuple[Array, Array]:
 
 
 def _centres(rotations: Array, positions: Array, centres_m: Array) -> Array:
-    """Return the centres of mass (7, 3) of links and payload, m, from `centres_m` in the frame of each."""
+    """Return the centres of mass (7, 3) of links and payload, m; `centres_m` has each in its body's own frame."""
     frame_index = [*range(1, len(positions)), len(positions) - 1]  # the payload is fixed to the last link
     centres: Array = positions[frame_index] + np.einsum("nij,nj->ni", rotations[frame_index], centres_m)
     return centres

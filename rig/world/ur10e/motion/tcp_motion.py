@@ -1,6 +1,7 @@
 """The controller's estimate of the tool centre point's motion from the joints: speeds, accelerations, accelerometer.
 
-It uses the controller's links, and a base that is upright and at rest. Linear parts come first, then angular ones.
+The estimate uses the controller's links, and a base that is upright and at rest. Linear parts come first, then angular
+ones.
 """
 
 from collections.abc import Sequence
