@@ -1,1 +1,1 @@
-"""YAML configuration → validated models."""
+"""YAML configurations, read into validated models."""

@@ -109,7 +109,8 @@ def load(
 def load_sensors(path: str | Path, overrides: Sequence[str] = ()) -> tuple[SensorsConfig, str | None]:
     """Read the sensors' part of a configuration; also return its text as `Loaded.laboratory` does.
 
-    A file with this section must be complete, because the laboratory simulates all of it. Raise `ConfigurationRefused`.
+    A file with a `world:` section must be complete, because the laboratory simulates all of it. Raise
+    `ConfigurationRefused`.
     """
     with _refusing_unreadable(str(path)):
         layered = read_layers(Path(path), overrides)

@@ -19,7 +19,7 @@ def meanings() -> Mapping[str, str]:
 
 
 def meaning_of(entry: str, key: str) -> str:
-    """Return the meaning of a key in an entry, named without its ending `Entry`.
+    """Return the meaning of a key in an entry; `entry` is the class' name without the ending `Entry`.
 
     Names of standard uncertainties and degrees of freedom state their meaning. Raise KeyError for an unknown key.
     """

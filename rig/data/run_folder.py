@@ -89,7 +89,7 @@ def _write_all(folder: Path, texts: Mapping[str, str]) -> None:
 
 
 def folder_of_its_own(parent: Path, what: str) -> Path:
-    """Make a new folder named by the time and its content `what`; several may begin in one second."""
+    """Make a new folder named by the time and its content `what`, and numbered if another has the same name."""
     parent.mkdir(parents=True, exist_ok=True)
     name = f"{datetime.now(UTC):%Y-%m-%dT%H-%M-%SZ}-{what}"
     folder, numbers = parent / name, itertools.count(2)

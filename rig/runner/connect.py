@@ -53,7 +53,7 @@ class Connector:
 
     - `results`: the calibrations of the previous phase, by sensor name.
     - `memory`: the sensors' earlier calibrations.
-    - `connecting`: connects the turner, or None for its kind's own function.
+    - `connecting`: the function that connects the turner; None for that of the turner's kind.
     """
 
     phase: Phase

@@ -28,7 +28,7 @@ class SensorSource(SampleSource, Protocol):
 
 @dataclass(frozen=True, slots=True)
 class PartKind:
-    """The operations on the sensors of a part at one port, by their names and sections; errors are SensorErrors.
+    """The operations on a part's sensors at one port, given as sections by sensor name; errors are SensorErrors.
 
     - `connect`: returns a context manager of their source, set up, which passes their samples on.
     - `describe`: returns the description of a sensor's samples.

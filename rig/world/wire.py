@@ -41,7 +41,7 @@ class SocketTable:
                 self._netlink = None
 
     def count_unread(self, connection: socket.socket) -> Unread:
-        """Return a function that counts the bytes sent by `connection` and unread at its other end, if known."""
+        """Return a function that counts the bytes that the other end of `connection` has not read; 0 if unknown."""
         netlink = self._netlink
         if netlink is None:
             return lambda: 0

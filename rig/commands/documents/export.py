@@ -106,9 +106,9 @@ def _read_recordings(run: Path, columns: Path | None) -> "Sequence[RunData]":
 
 
 def _make_folder(folder: Path, *, named_by_user: bool) -> None:
-    """Make the folder unless a link leads out of it.
+    """Make the folder, and raise Refused if it contains a link.
 
-    Raise OSError, and Refused for a link in it. The folder itself may be a link if the user named it.
+    The folder itself may be a link only if the user named it. Raise OSError too.
     """
     from rig.data.run_folder import refuse_links
 

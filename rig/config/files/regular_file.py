@@ -61,7 +61,7 @@ def read_regular_file(path: Path, max_bytes: int, *, follow_links: bool = True) 
 
 
 def _check(status: os.stat_result, max_bytes: int) -> None:
-    """Raise UnfitFile unless the file is regular, short enough and not the open history."""
+    """Raise UnfitFile unless the file is regular, short enough, and not a file of the open history."""
     if stat.S_ISLNK(status.st_mode):
         raise UnfitFile("it is a link")
     if not stat.S_ISREG(status.st_mode):

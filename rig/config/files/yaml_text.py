@@ -98,7 +98,7 @@ def read_yaml(text: str) -> Document:
 
 
 def _compose(text: str) -> "tuple[_Loader, yaml.Node | None]":
-    """Return the loader of a text and its node. libyaml parses five times as fast; PyYAML describes errors better."""
+    """Parse a text; return loader and root node. libyaml is five times as fast, PyYAML describes errors better."""
     try:
         loader = _Loader(text, yaml.CSafeLoader(text))
         return loader, loader.get_single_node()

@@ -1,7 +1,7 @@
 """Attitudes by name: angles of the wrists 1, 2, 3 in degrees, with base, shoulder and elbow at home.
 
-They are possible on every known arm except a UR3e, whose forearm is too short. Wrist 2 remains at -90°, where the
-flange keeps its distance from the forearm, and wrists 1 and 3 reach every attitude.
+The attitudes are possible on every known arm except a UR3e, whose forearm is too short. Wrist 2 remains at -90°, where
+the flange keeps its distance from the forearm, and wrists 1 and 3 reach every attitude.
 `rig.estimation.design.attitude_design` computes their efficiency.
 """
 

@@ -417,7 +417,7 @@ class ThermalSection(SixSweepsSection, AttitudesSection):
 
     @model_validator(mode="after")
     def check_temperature_range(self) -> Self:
-        """Refuse a range too narrow for polynomials, a reference temperature near its ends, and a limit within it."""
+        """Refuse a range too narrow for polynomials, a reference near its ends, and a temperature limit within it."""
         gaps, other = (2, "") if self.both_directions else (3, " with both_directions: false")
         if self.to_c - self.from_c < gaps * self.max_step_k:
             raise ValueError(
@@ -434,7 +434,7 @@ class ThermalSection(SixSweepsSection, AttitudesSection):
 
     @property
     def accelerometer_order(self) -> AccelerometerOrder:
-        """The order of the accelerometer's model if a set has attitudes; else 0."""
+        """The order of the accelerometer's model if attitudes are visited at each temperature; else 0."""
         return (2 if self.second_order else 1) if self.with_attitudes else 0
 
     def problems(self, config: RigConfig) -> Iterator[str]:

@@ -1,6 +1,6 @@
 """The process that reads one file: `python -m rig.data.processes.reading_child`, or a forked one.
 
-It writes the parts that the reader yields to stdout, for `rig.data.processes.reading_process`: a line of JSON for a
+It writes to stdout, for `rig.data.processes.reading_process`, the parts that the reader yields: a line of JSON for a
 dict, an array in NumPy's format. A failure ends in one line on stderr and a `Status`.
 """
 

@@ -119,11 +119,12 @@ class Item:
 
 @dataclass(frozen=True, slots=True)
 class ExternalReadings:
-    """The `readings` (n,) of an item, and the rows (N,) of sweeps or of attitudes of its `motion`, by column.
+    """The `readings` (n,) of an item, and the rows (N,) of its `motion`, both by column.
 
-    For "turns" by hand the readings show the motion, and one row has the user's declarations. Times are relative to
-    `origin_s` of the files' clock. `other_rows` is the number of rows with readings of other sensors only. `note`
-    states what the file's format does not specify about its readings, "" if nothing.
+    `tells` is the kind of the motion: sweeps or attitudes, or "turns" by hand, which the readings show and one row of
+    the user's declarations describes. Times are relative to `origin_s` of the files' clock. `other_rows` is the number
+    of rows with readings of other sensors only. `note` states what the file's format does not specify about its
+    readings, "" if nothing.
     """
 
     item: Item

@@ -13,7 +13,7 @@ GAUSS_T = 1e-4
 
 
 class MagneticFieldReader:
-    """The assembler of one stream's field samples (FIELD_SAMPLE_DTYPE) from messages; one without all axes is lost.
+    """The assembler of one stream's field samples, FIELD_SAMPLE_DTYPE; readings without all three axes are lost.
 
     `t_per_count` is the size of a count, `full_scale_counts` the largest count. A sample has the time of the message
     with its y axis; samples are numbered from the first complete reading.

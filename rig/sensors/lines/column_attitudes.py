@@ -35,7 +35,7 @@ def describe_unread_attitudes(layout: TableLayout, matrices: Sequence[int], angl
 
 
 def list_angles(layout: TableLayout) -> list[int]:
-    """Return the columns with headings of attitude angles and without a unit of a rate."""
+    """Return the columns whose headings name attitude angles and state no unit of a rate."""
     return [
         index
         for index in layout.numbers
@@ -95,7 +95,7 @@ def _says_otherwise(layout: TableLayout, index: int) -> bool:
 
 
 def _plain(heading: str) -> str:
-    """Return a heading in small letters, with one underscore for all between its words."""
+    """Return a heading in small letters, with a single underscore between its words."""
     return re.sub(r"[\W_]+", "_", heading.lower()).strip("_")
 
 

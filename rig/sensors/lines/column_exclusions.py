@@ -40,7 +40,7 @@ def find_virtual(layout: TableLayout, values: Array, title: str) -> tuple[set[in
 
 
 def _has_gravity(values: Array) -> bool:
-    """Return whether the median size of readings (n, k) is near gravity in some unit."""
+    """Return whether the median norm of readings (n, k) is near gravity in some unit."""
     level = float(np.nanmedian(np.linalg.norm(values[:, :3], axis=1)))
     return any(LEAST_GRAVITY < level / size < 1 / LEAST_GRAVITY for size in GRAVITY_BY_UNIT.values())
 

@@ -25,7 +25,7 @@ KIND_OF = {UNITS["rad/s"].quantity: "gyro", UNITS["m/s2"].quantity: "acc", UNITS
 def state_unit(layout: TableLayout, index: int) -> str:
     """Return the unit that a column's heading states, as `UNITS` spells it, or "".
 
-    G after an accelerometer's name is that of gravity, not gauss.
+    The unit G after an accelerometer's name means gravity, not gauss.
     """
     unit = layout.units[index]
     return unit.lower() if unit in {"G", "mG"} and "acc" in layout.headings[index].lower() else unit

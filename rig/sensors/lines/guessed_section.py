@@ -88,7 +88,7 @@ def _quote(text: str) -> str:
 
 
 def _round_rate(rate_hz: float) -> float:
-    """Return the nearest round rate, or three digits if none is near."""
+    """Return the nearest round rate, or the rate with three digits if no round one is near."""
     size = 10.0 ** (len(str(int(rate_hz))) - 1)
     for digits in ROUND_DIGITS:
         if abs(rate_hz / (digits * size) - 1) < RATE_TOLERANCE:

@@ -115,7 +115,7 @@ def match_names(names: tuple[str, ...]) -> dict[int, str]:
 
 
 def _find_time(shape: Shape, guess: Guess) -> None:
-    """Find the columns that increase steadily: a sequence number by ones, and a time, with its unit."""
+    """Enter into the guess the columns that increase steadily: a sequence number, and a time with its unit."""
     duration_s = float(shape.arrived_s[-1] - shape.arrived_s[0])
     guess.rate_hz = (len(shape.values) - 1) / duration_s
     for index in range(shape.values.shape[1]):
@@ -181,7 +181,7 @@ def _unit_of_time(steps: Array, interval_s: float) -> str | None:
 
 
 def find_triads(shape: Shape, guess: Guess, still: Flags, starts: Iterable[int] | None = None) -> None:
-    """Find unnamed triads of adjacent columns by their norms at rest and in rotation.
+    """Enter into the guess the unnamed triads of adjacent columns, as their norms at rest and in rotation show.
 
     `starts`: the columns with which a triad may begin, all if None.
     """

@@ -231,7 +231,7 @@ def _interpret_texts(common: tuple[str, ...]) -> tuple[str, str, tuple[str, ...]
 
 
 def _find_header(others: Sequence[str], separator: str, count: int) -> tuple[str, ...]:
-    """Return the `count` column names in one of the other lines, or empty."""
+    """Return the `count` column names that one of the other lines has; empty if none has them."""
     sign = {name: sign for sign, name in _SEPARATORS.items()}[separator]
     for text in others:
         names = [name.strip(" \"'") for name in text.lstrip("#%/ ").split(sign or None)]

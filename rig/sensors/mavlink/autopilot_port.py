@@ -20,7 +20,7 @@ def open_port(port: str, baud: int) -> DevicePort:
 
 
 class UdpPort:
-    """Datagrams to an address of this computer; answers go to the sender of the first one."""
+    """A port of datagrams to an address of this computer; answers go to the sender of the first datagram."""
 
     def __init__(self, host: str, port: int) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)

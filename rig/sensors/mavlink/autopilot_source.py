@@ -46,7 +46,7 @@ RANGE_FRACTION = 0.98  # of the 16-bit range, because undoing a correction may s
 class _ImuStream:
     """One configured IMU of the stream: its correction, numbering, and the intervals of its first messages.
 
-    `without_reading` counts the messages without a new rate, or without a new force if that is recorded.
+    `without_reading` counts the messages without a new rate, or without a new force if forces are recorded.
     """
 
     def __init__(self, name: str, section: SensorSection) -> None:

@@ -45,6 +45,6 @@ def decode_float(field: bytes) -> float:
 
 
 def extract_value(frame: bytes) -> bytes:
-    """Return the four bytes of the value in the frame of a PARAM_VALUE, which follow its header."""
+    """Return the four bytes of the value, which follow the header in the frame of a PARAM_VALUE."""
     begin = 10 if frame[0] == 0xFD else 6
     return frame[begin : begin + 4]

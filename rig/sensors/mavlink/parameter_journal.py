@@ -53,7 +53,7 @@ class ParameterChange:
         return json.dumps({**head, **sets}, indent=2) + "\n"
 
     def keep(self) -> None:
-        """Write the file that restores the old parameters. Raise Refused `autopilot_not_kept`, also if there is one."""
+        """Write the file that restores the old parameters. Raise Refused `autopilot_not_kept`, also if it exists."""
         try:
             _write(self.backup, self.serialize(), exclusive=True)
         except OSError as error:

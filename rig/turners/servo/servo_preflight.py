@@ -136,7 +136,7 @@ def _condition(report: ServoReport) -> list[Problem]:
 
 
 def _load(report: ServoReport, carried: FlangeLoad) -> list[Problem]:
-    """Return a problem if a payload's torque would be too high on a horizontal shaft: the real direction is unknown."""
+    """Return a problem if a payload's torque would be too high on a horizontal shaft, the worst possible direction."""
     lever_m = math.hypot(*carried.centre_m[:2])
     torque_nm = carried.payload_kg * GRAVITY_M_S2 * lever_m
     most_nm = LOAD_FRACTION * report.servo.stall_torque_nm

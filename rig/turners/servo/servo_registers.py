@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 
 class Register(NamedTuple):
-    """An address with the `struct` format of its values, little-endian."""
+    """A register: its address, the little-endian `struct` format of its values, and its name."""
 
     address: int
     form: str

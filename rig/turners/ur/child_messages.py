@@ -34,7 +34,7 @@ class BrakeRequest:
 
 @dataclass(frozen=True, slots=True)
 class Alive:
-    """The parent's sign of life; without it the child stops the arm itself. No answer."""
+    """The parent's sign of life; without it the child stops the arm itself. It is not answered."""
 
 
 Request = TakeControl | MoveRequest | BrakeRequest | Alive
@@ -53,7 +53,7 @@ class Connected:
 class ChildHeartbeat:
     """The child's sign of life; `states` are those since the last one, oldest first.
 
-    `silent_s`: the shortest possible time without data from the controller (`StateStream`).
+    `silent_s`: a lower bound of the time since data came from the controller (`StateStream`).
     """
 
     states: tuple[ArmState, ...]

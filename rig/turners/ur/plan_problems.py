@@ -19,7 +19,7 @@ def plan_problems(
     arm: DenavitHartenberg | None = None,
     controller: JointLimits | None = None,
 ) -> list[Problem]:
-    """Return the problems of a plan: invalid steps, and limits of position, speed, acceleration, payload and clearance.
+    """Return a plan's problems: invalid steps, and excess of position, speed, acceleration, payload or clearance.
 
     Clearance is the distance of the flange and its payload from the arm. The narrower of the `controller`'s and the
     `model`'s limits is used. Lengths are those of `arm` if given, otherwise nominal.

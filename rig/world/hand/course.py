@@ -84,7 +84,7 @@ def build_course(start: Array, time_s: Array, rates: Array, habits: Habits, knoc
 
 
 def integrate_rates(time_s: Array, rates: Array) -> Array:
-    """Return attitudes (n, 3, 3) for rates (n, 3) that are linear between times (n,), to third order in the time step."""
+    """Return attitudes (n, 3, 3) for rates (n, 3) that are linear between times (n,), to third order in the step."""
     step = np.diff(time_s)[:, None]
     vectors = 0.5 * step * (rates[1:] + rates[:-1]) + step**2 / 12 * np.cross(rates[:-1], rates[1:])
     return multiply_steps(vectors)

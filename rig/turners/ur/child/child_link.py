@@ -73,7 +73,7 @@ class ChildLink:
     def start(self) -> None:
         """Start the child process, whose first message is `Connected` or `RequestFailed`.
 
-        Watch for silence of the child and, if local, of the controller.
+        Watch for silence of the child, and of the controller if it is a process of this computer.
         """
         ip = resolve_address(self._host)
         self._is_remote = ip is None or not ip.is_loopback

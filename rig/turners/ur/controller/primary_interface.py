@@ -40,7 +40,7 @@ MAX_VALUE = 1e4  # m or rad: a calibration of almost parallel axes has lengths o
 class ArmDescription:
     """The arm's geometry, its tool centre point in the flange's frame, its setup, and the controller's software.
 
-    None for items that the controller has not sent.
+    An item that the controller has not sent is None.
     """
 
     kinematics: DenavitHartenberg | None = None

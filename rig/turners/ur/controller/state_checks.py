@@ -93,7 +93,7 @@ def clock_step(before_s: float, after_s: float, period_s: float, missed_s: float
 
 
 def _divides(period_s: float) -> bool:
-    """Return whether a period is a whole number of the controller's cycles; otherwise states jitter."""
+    """Return whether a period is a whole number of the controller's cycles; otherwise the states' times jitter."""
     cycles = period_s / CYCLE_S
     return abs(cycles - round(cycles)) < 1e-6
 

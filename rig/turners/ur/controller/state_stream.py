@@ -2,8 +2,7 @@
 
 The receive interface of `ur_rtde` keeps only the newest packet and does not signal its arrival, so a delayed reader
 loses states. In this stream the states wait in the socket until they are read. This module only receives; `ur_rtde`
-drives the arm.
-(Real-Time Data Exchange guide of the maker.)
+drives the arm. Source: the maker's Real-Time Data Exchange guide.
 """
 
 import math
