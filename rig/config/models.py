@@ -267,7 +267,10 @@ class SensorsConfig(Section):
     @field_validator("sensors")
     @classmethod
     def check_link_rate(cls, sensors: dict[str, SensorSection], info: ValidationInfo) -> dict[str, SensorSection]:
-        """Refuse sensors on a missing board, and data rates beyond the link's capacity, given the larger messages."""
+        """Refuse sensors on a missing board, and data rates beyond the link's capacity.
+
+        A sensor to calibrate counts with the larger messages of those with its raw and with its corrected readings.
+        """
         streams = _streams(sensors)
         if "board" not in info.data or not streams:
             return sensors

@@ -26,7 +26,7 @@ MAX_SHOWN = 3  # of a run that are reported
 
 @dataclass(frozen=True, slots=True)
 class EntryState:
-    """The state of `what`: the path of a file, or the number of an entry."""
+    """The state of a file or entry: `what` is the path of the file or the number of the entry, `why` the reason."""
 
     what: str
     state: State

@@ -264,7 +264,7 @@ class Connector:
     ) -> BoardCalibration | None:
         """Return the board's own calibration from raw readings, with its observations from before an interruption.
 
-        None if the readings are not raw, or no sensor on the board is to be calibrated.
+        Return None if the readings are not raw, or no sensor on the board is to be calibrated.
         """
         to_calibrate = {
             name: (sensor.index, sensor.described)

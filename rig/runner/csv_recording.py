@@ -44,7 +44,7 @@ def connect_sensors(config: SensorsConfig, on_samples: OnSamples) -> Iterator[tu
 
 @dataclass(frozen=True, slots=True)
 class RecordedFile:
-    """The number of samples in a file, and whether the board's clock followed its crystal (None: no board)."""
+    """The counts of a file's samples, and whether the board's clock followed its crystal (None without a board)."""
 
     summary: SensorSamples
     follows_crystal: bool | None

@@ -91,7 +91,7 @@ class EndingEarly:
         return UncertaintySoFar(reached.scale, reached.bias_rad_s, self._repeats_left, self.ended)
 
     def skips(self, motion: Motion) -> bool:
-        """Return whether to skip the plan's next motion: after an early end, all except the one to home."""
+        """Return whether to skip the plan's next motion: after an early end, all but the motion to home are skipped."""
         index, self._motions = self._motions, self._motions + 1
         return self.ended and index != self._home
 

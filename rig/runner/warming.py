@@ -169,7 +169,10 @@ class Warming:
             )
 
     def _refuse_fast(self, name: str, read_s: float, temperature_c: float) -> None:
-        """Raise Fault `too_fast` for a fast change by the board's times, because readings may arrive late."""
+        """Raise Fault `too_fast` if the temperature changes too fast.
+
+        The rate is computed from the times of the readings, not of their arrival, which may be late.
+        """
         history = self._history.setdefault(name, deque())
         if history and read_s <= history[-1][0]:
             return

@@ -215,7 +215,7 @@ class LinesSection(Section):
 
     @model_validator(mode="after")
     def match_columns_and_sections(self) -> Self:
-        """Refuse unknown columns, reserved names, and columns without a section or key, or the reverse."""
+        """Refuse unknown columns, reserved names, and columns, sections or keys without their counterparts."""
         if self.keys and len(self.keys) != len(self.columns):
             raise ValueError(f"there are {len(self.keys)} keys for {len(self.columns)} columns; give one for each")
         if reserved := sorted(self.scalars.keys() & {*COLUMNS, "field"}):

@@ -79,7 +79,7 @@ def step(average: Array, deviation: Array, before: int) -> tuple[Array, float]:
 
 
 def raise_alarms(deviation: Array, average: Array, limit: float | Array) -> Alarms:
-    """Return whether each deviation exceeds Shewhart's limit or its EWMA `average` the `limit`."""
+    """Return whether each deviation exceeds Shewhart's limit, or its EWMA `average` exceeds the `limit`."""
     return (np.abs(deviation) > SHEWHART_LIMIT) | (np.abs(average) > limit)
 
 

@@ -1,4 +1,4 @@
-"""Effects of rigs on results; sensors calibrated on several rigs separate them from the effects of sensors."""
+"""Effects of rigs on results, which sensors calibrated on several rigs separate from the sensors' own effects."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -2,7 +2,7 @@
 
 So a row changed, added or removed outside of the rig is detected. A changed line is detected too: a line contains its
 own hash and the hash of the chain before it. A user who may write all tables can write a consistent new journal, or cut
-off its end. Only a `Head` stored elsewhere detects that: a signed certificate names one.
+off its end. Only a `Head` stored elsewhere, such as the one in a signed certificate, detects that.
 """
 
 import hashlib
@@ -119,7 +119,7 @@ def broken(connection: Connection) -> Iterator[Broken]:
 
 
 def unlike(connection: Connection, table: Table, *key: int | str) -> Broken | None:
-    """Return the difference of the row with this primary key from the journal; None if there is none."""
+    """Return the difference of the row with this primary key from the journal; None if there is no difference."""
     lines = schema.journal.c
     query = select(lines.sha256).where(lines.kind == table.name, lines.key == json.dumps(key))
     entered = connection.scalar(query)

@@ -86,7 +86,10 @@ def sqlite_engine(file: Path, label: str, *, new: bool = False) -> Engine:
 
 
 def _connect_to_write(file: Path, *, new: bool) -> sqlite3.Connection:
-    """Open a file with a write-ahead log, so readers and a writer do not block each other. Not for network shares."""
+    """Open a file with a write-ahead log, so readers and a writer do not block each other.
+
+    Such a log does not work on network shares.
+    """
     connection = _connect(file, "mode=rwc" if new else "mode=rw")
     if not new:
         refuse_unmarked(connection, file)

@@ -14,7 +14,7 @@ DEGREE_RAD = pi / 180
 
 
 def select_changed(changes: Iterable[Change]) -> list[Change]:
-    """Return the significant changes, the largest change in multiples of its U first."""
+    """Return the significant changes, in decreasing order of the change's size in multiples of its U."""
     return sorted((change for change in changes if change.has_changed), key=lambda change: -change.normalised_error)
 
 

@@ -36,7 +36,7 @@ Revolution = tuple[int, int, float]  # two board times, µs, and the speed betwe
 
 @dataclass(slots=True)
 class BoardCalibration:
-    """A calibration of `sensors` (name → its index on the board and its description) by the board.
+    """The board's own calibration of `sensors`: by name, the index of each on the board and its description.
 
     `note` records and reports the board's answers.
     """

@@ -82,7 +82,7 @@ def open_board_source(config: SensorsConfig, on_samples: OnSamples, *, calibrate
 def set_up_sensors(board: Board, config: SensorsConfig, *, calibrated: bool) -> Mapping[str, BoardSensor]:
     """Set up all configured sensors on the board; those to calibrate stream corrected readings if `calibrated`.
 
-    Return them by name. Raise Refused as `find_sensor` and `read_stored_calibration` do.
+    Return the sensors by name. Raise Refused as `find_sensor` and `read_stored_calibration` do.
     """
     gyroscopes = {
         name: _set_up_corrected(board, name, section)

@@ -170,7 +170,7 @@ def read_kept_solution(board: Board) -> CalibratedByBoard:
 
 
 def _check(name: str, sensor: RecordedSensor, board: Board) -> None:
-    """Raise Refused unless the board can calibrate the sensor by hand: accelerations, and a clock on its crystal."""
+    """Raise Refused unless the sensor measures acceleration and the board's clock follows its crystal."""
     if not sensor.measures(ACCELERATION):
         raise Refused(
             "first_face_unknown",
