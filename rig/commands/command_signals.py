@@ -12,7 +12,7 @@ _PRINTING_BEHIND = getattr(signal, "SIGTTOU", None)
 
 
 def end_by_interrupt() -> None:
-    """Make every ending signal raise KeyboardInterrupt from now on.
+    """Make every signal that ends or suspends a process raise KeyboardInterrupt from now on.
 
     By default a closed terminal, Ctrl-\\, Ctrl-Z or another such signal ends or suspends this process while the arm
     goes on moving.
@@ -39,7 +39,7 @@ def ignore_endings() -> None:
 
 @contextmanager
 def ending_by_interrupt() -> Iterator[None]:
-    """Make every ending signal raise KeyboardInterrupt in the block, and restore the handlers afterwards."""
+    """Make signals raise KeyboardInterrupt in the block as `end_by_interrupt` does, then restore the handlers."""
     changed = ENDING_SIGNALS if _PRINTING_BEHIND is None else (*ENDING_SIGNALS, _PRINTING_BEHIND)
     before = {number: signal.getsignal(number) for number in changed}
     end_by_interrupt()

@@ -317,7 +317,7 @@ def _explain(model: type[BaseModel], item: Any, prefix: Location, layered: Merge
 
 
 def _hint_at_override(section: Location, layered: MergedLayers) -> str:
-    """Return a hint that only `--set` names a section, with the files' names that may be meant; "" if a file has it."""
+    """Return a hint that a section comes from `--set` alone, with the sections that the file has, or else ""."""
     if layered.places.get(section) != SET:
         return ""
     siblings: Any = layered.document

@@ -18,7 +18,10 @@ NO_PARAMETERS: Mapping[str, Array] = MappingProxyType({})
 
 
 def write_header(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
-    """Write `calibration.h`, unless the calibration failed its limits and must not be used."""
+    """Write `calibration.h`, and return the event of the file.
+
+    Nothing is written for a calibration that failed its limits and must not be used, or without a calibration.
+    """
     by_sensor = {name: g_sensitivity(result) for name, result in outcome.results.items()}
     sensitivities = {name: matrix for name, matrix in by_sensor.items() if matrix is not None}
     if not outcome.passed or not any(_calibrations(document, sensitivities)):

@@ -286,7 +286,7 @@ class Rig:
             raise Fault("unplanned_motion", f"{what}, but in the plan that passed pre-flight {planned}", remedy)
 
     def _skips(self, motion: Motion) -> bool:
-        """Return whether to skip a motion because the target is reached; assess this after each repeat."""
+        """Return whether to skip a motion because the target uncertainty, assessed after each repeat, is reached."""
         if self.early is None:
             return False
         if self.early.due():
@@ -305,7 +305,7 @@ class Rig:
         return self.early.skips(motion)
 
     def _observe(self, sweep: Sweep) -> None:
-        """Let the board average the sweep; while its window is computed, for seconds, a heater is still controlled."""
+        """Let the board average the sweep, whose window is computed in seconds; meanwhile control a heater, if any."""
         if self.onboard is None:
             return
         if self.warming is None:

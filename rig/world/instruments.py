@@ -33,7 +33,7 @@ class InstrumentMount:
     """The place of an instrument in the simulated laboratory, with its port.
 
     - kind: its name in control requests.
-    - build: returns the instrument with power, at a virtual time in s; its non-volatile memory is bound in `build`.
+    - build: returns the instrument, switched on at a virtual time, s; `build` itself holds the non-volatile memory.
     - pty: whether its port is also a pseudo-terminal.
     - bit_error_rate: the fraction of wrong bits on its line when the world starts.
     - stolen: the fraction of its bytes that another program on the port reads, when the world starts.

@@ -179,7 +179,7 @@ class Laboratory:
         return 0.0 if self.board is None else self.board.heater_duty
 
     def _build_element(self, name: str, sensor: SensorTruth) -> MotionAt:
-        """Return the motion of a sensor on the board over time; a fault can be added to this function."""
+        """Return the motion of a sensor on the board as a function of virtual time, which a fault can falsify."""
         return self._elements.setdefault(name, SensingElement(self._build_motion(sensor)))
 
     def _build_motion(self, sensor: SensorTruth) -> MotionAt:

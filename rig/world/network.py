@@ -100,7 +100,8 @@ class ClientConnection:
     def deliver(self, idle: bool, patient: bool) -> float:
         """Send the bytes of past ticks, unless `patient` is set and the client lags too far.
 
-        Return the wall time to wait for the client, s; 0 if it does not lag too far, or without patience.
+        Return the wall time to wait for the client, s; 0 if it does not lag too far, or if not `patient`. `idle` is as
+        in `Network.deliver`.
         """
         if self.listener.silent:
             return 0.0

@@ -82,7 +82,7 @@ class Wire:
 
     A wait ends when a real laboratory would have continued, because otherwise other clients would regard the world as
     dead. The world waits for a client that reads as fast as it can, even if it is slow. For a client that does not
-    read, the world waits only until its patience ends, and not again before the client has kept pace.
+    read, the world waits only until its patience with this client ends, and not again before the client has kept pace.
     """
 
     def __init__(self, count_unread: Unread, lag_s: float, wall: Callable[[], float]) -> None:
@@ -123,7 +123,7 @@ class Wire:
         return max(0.0, min(due_s, max(POLL_LIMITS_S[0], waited_s / 4), POLL_LIMITS_S[1]))
 
     def _take(self, now_s: float) -> None:
-        """Record that the client has read something. If it did not read before, reduce its patience."""
+        """Record that the client has read something. If it did not read for a while, reduce the patience with it."""
         waited_s = 0.0 if self._waiting_since_s is None else now_s - self._waiting_since_s
         if waited_s > MAX_PACED_WAIT_S:
             self._slept = True

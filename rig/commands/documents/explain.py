@@ -79,7 +79,7 @@ def _explain_error(name: str) -> Iterator[str]:
 
 
 def _explain_remedies(name: str, usual: str) -> Iterator[str]:
-    """Yield an error's remedies. If methods differ, yield one line for each, the latest run's method first."""
+    """Yield the `usual` remedy of an error, or one for each method of calibration, the latest run's method first."""
     from rig.errors.remedies_by_method import remedies_by_method
 
     remedies = remedies_by_method(name)

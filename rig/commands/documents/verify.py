@@ -135,7 +135,7 @@ def _look_up(
 def _judge(
     file: Path, content: bytes, looks: "Mapping[Path, FileInspection]", history_answer: "FileEntries | None"
 ) -> VerifiedFile:
-    """Judge a file by its signature or, without one, by a signed file that contains it, or by the history.
+    """Return the findings on a file: by its signature, or else by a signed file that contains it, and by the history.
 
     `looks` are the inspections of all files. An unsigned file that the history confirms needs no trusted signer.
     """

@@ -64,7 +64,7 @@ def opening_text(control: str) -> str:
 
 
 def find_incident(words: str) -> Incident | None:
-    """Return the incident that `words` name, None if they name none. `slider` takes any whole percentage up to 100."""
+    """Return the incident that `words` name, None if they name none; after `slider` comes a percentage up to 100."""
     words = " ".join(words.lower().split())
     if (slider := SLIDER.fullmatch(words)) is not None and int(slider[1]) <= 100:
         return _slider(int(slider[1]))
@@ -72,9 +72,9 @@ def find_incident(words: str) -> Incident | None:
 
 
 def practise(control: str, words: str) -> str:
-    """Cause the incident that `words` name in the laboratory, and return the description of its effect.
+    """Cause the incident that `words` name in the laboratory; return its effect, or why it cannot happen, in words.
 
-    Raise Fault `world_ended` if the laboratory has ended.
+    For words that name no incident, return the list of incidents. Raise Fault `world_ended`.
     """
     incident = find_incident(words)
     if incident is None:

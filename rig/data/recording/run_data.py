@@ -1,4 +1,4 @@
-"""A recording in memory. The module does not import the contents' descriptions, because a plan needs only the type."""
+"""A recording in memory. A plan needs only its type, so the types of the contents are not imported at run time."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -52,7 +52,7 @@ class ObservationThresholds(ObservationKeys):
     @model_validator(mode="before")
     @classmethod
     def complete(cls, document: Any) -> Any:
-        """Return the keys of a recording. Raise ValueError for a missing one."""
+        """Return the recorded keys (`document`) unchanged. Raise ValueError naming missing ones."""
         return refuse_missing_keys(cls, document)
 
 
@@ -100,7 +100,7 @@ class Uncertainty(UncertaintyKeys[dict[str, NonNegative]]):
     @model_validator(mode="before")
     @classmethod
     def complete(cls, document: Any) -> Any:
-        """Return the keys of a recording. Raise ValueError for a missing one."""
+        """Return the recorded keys (`document`) unchanged. Raise ValueError naming missing ones."""
         return refuse_missing_keys(cls, document)
 
     @property

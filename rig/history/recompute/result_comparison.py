@@ -91,7 +91,10 @@ class ParameterMove:
 
 @dataclass(frozen=True)
 class ComparedResult:
-    """A stated result, and the `answer` recomputed from its recordings, if any. Changes above `of_u` × U count."""
+    """A stated result, and the `answer` recomputed from its recordings, if any.
+
+    A value counts as changed if it moved by more than `of_u` × stated U.
+    """
 
     stated: StatedResult
     answer: Answer | None

@@ -35,7 +35,7 @@ def accelerometer_lines(finding: Finding[AccelerometerEntry], _: Mapping[str, Ar
 
 
 def magnetometer_lines(finding: Finding[MagnetometerEntry], _: Mapping[str, Array]) -> Iterator[str]:
-    """Yield C source for a magnetometer; the correction is valid only as mounted."""
+    """Yield C source for a magnetometer, whose correction is valid only while its mounting remains the same."""
     entry = finding.entry
     return _subtraction_lines(finding, entry.bias_t, entry.correction_matrix, "field_t", (
         f"/* Magnetometer {_comment(f'{entry.part}, serial number {entry.serial_number}')}: B = M (m - b), in tesla.",

@@ -11,7 +11,7 @@ from rig.report.findings.finding import Finding
 
 
 def temperature_lines(finding: Finding[OverTemperatureEntry], _: Mapping[str, Array]) -> Iterator[str]:
-    """Yield C source that corrects a sensor at any temperature; it needs the source for the reference temperature."""
+    """Yield C source that corrects a sensor at any temperature, using the source for the reference temperature."""
     entry, quantity = finding.entry, finding.quantity
     sensor, unit = prefix_of(finding.sensor), quantity.suffix
     name = "_".join([sensor, *([quantity.name] if quantity.prefix else [])])

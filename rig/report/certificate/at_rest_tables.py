@@ -19,7 +19,7 @@ MICRO = 1e6
 
 @dataclass(frozen=True, slots=True)
 class ReversalRow:
-    """One axis of a magnetometer's reversal. If `mixed`, it was not turned over: its bias includes the arm's field."""
+    """One axis of a magnetometer's reversal; if `mixed`, it was not turned over, so `bias` has the arm's field."""
 
     axis: str
     scale: Pair
@@ -48,7 +48,7 @@ def acceleration_rows(entry: AccelerometerEntry) -> list[AxisRow]:
 
 
 def field_rows(entry: MagnetometerEntry) -> list[AxisRow]:
-    """Return a magnetometer's axes with U; the bias in µT."""
+    """Return a row with U for each magnetometer axis; biases are in µT."""
     return rows_of(entry.scale, entry.bias_t, entry.budget.expanded, size=MICRO)
 
 

@@ -155,7 +155,7 @@ def _identification(issuer: str, value: str, name: str) -> Element:
 
 
 def _statements(c: Certificate) -> Iterator[Element]:
-    """Yield the declarations on validity, traceability, scope and each limit of conformity."""
+    """Yield the elements that declare validity, traceability, scope and each limit of conformity."""
     for mark in c.marks:
         yield dcc("statement", text("name", "validity"), text("declaration", f"{mark}."), words("valid", "false"))
     time = c.stated.where.time_reference
@@ -226,7 +226,7 @@ def _result(c: Certificate, item: str, measured: CertifiedItem) -> Element:
 
 
 def _arm(c: Certificate) -> Element:
-    """Return the machine that turned the items, according to its recorded model."""
+    """Return the element of the machine that turned the items, according to its recorded model."""
     provenance = c.provenance
     identified = provenance.arm_maker is not None and provenance.arm_model is not None
     return dcc(

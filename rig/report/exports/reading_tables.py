@@ -22,7 +22,7 @@ def tables_of(recordings: Sequence[Exported]) -> Iterator[ExportTable]:
 
 
 def write_csv(recordings: Sequence[Exported], folder: Path) -> list[Path]:
-    """Write a file for each table, and `README.txt` with their meanings."""
+    """Write a file for each table, and `README.txt` with the tables' meanings; return the paths."""
     written = []
     lines = []
     for table in tables_of(recordings):
@@ -38,7 +38,7 @@ def write_csv(recordings: Sequence[Exported], folder: Path) -> list[Path]:
 
 
 def write_parquet(recordings: Sequence[Exported], folder: Path) -> list[Path]:
-    """Write a file for each table; its metadata `convention` is the table's meaning."""
+    """Write a file for each table, with its meaning as the metadata `convention`; return the paths."""
     import pyarrow
     import pyarrow.parquet
 
@@ -53,7 +53,7 @@ def write_parquet(recordings: Sequence[Exported], folder: Path) -> list[Path]:
 
 
 def write_mat(recordings: Sequence[Exported], folder: Path) -> list[Path]:
-    """Write `run.mat`: a struct for each table, with its columns (n, 1) and, as `convention`, its meaning."""
+    """Write `run.mat`, a struct for each table with columns (n, 1) and meaning (`convention`); return its path."""
     from scipy.io import savemat
 
     tables = tuple(tables_of(recordings))

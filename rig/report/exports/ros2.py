@@ -28,7 +28,10 @@ CONVENTION = (
 
 
 def write_bag(recordings: Sequence[Exported], folder: Path) -> list[Path]:
-    """Write the new folder `bag`, all or nothing. Raise OSError, Refused `report_folder`, `nothing_to_export`."""
+    """Write the new folder `bag`, completely or not at all, and return its path.
+
+    Raise OSError, Refused `report_folder`, `nothing_to_export`.
+    """
     path = folder / BAG
     if path.exists():
         raise Refused("report_folder", f"{path} exists already", "Choose another with --out")

@@ -25,9 +25,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class AttitudePlot:
-    """A sensor in N attitudes; arrays (N, 3): residuals, their expected standard deviation, and the noise.
+    """A sensor in N attitudes; arrays (N, 3): residuals, and the standard deviations that are `expected` of them.
 
-    `towards` (N, 3): the reference, gravity or the field, in the sensor's nominal axes.
+    `noise` (N, 3): the standard deviations of the mean readings due to noise. `towards` (N, 3): the reference, gravity
+    or the field, in the sensor's nominal axes.
     """
 
     quantity: Quantity
@@ -38,7 +39,7 @@ class AttitudePlot:
 
 
 def write_attitude_figures(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
-    """Write `accelerometer_<sensor>` and `magnetometer_<sensor>` as PNG and SVG; nothing without matplotlib."""
+    """Draw `accelerometer_<sensor>` and `magnetometer_<sensor>`; return the event as `write_pictures` does."""
     return write_pictures(
         [
             Picture(

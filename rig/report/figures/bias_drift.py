@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def write_drift_figures(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
-    """Write `bias_drift_<sensor>` for each sensor with biases by repeat, as PNG and SVG; nothing without matplotlib."""
+    """Draw `bias_drift_<sensor>` for each sensor with biases by repeat; return the event as `write_pictures` does."""
     return write_pictures(
         [
             Picture(

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def write_temperature_figures(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
-    """Write `over_temperature_<sensor>` for each sensor with polynomials, as PNG and SVG; none without matplotlib."""
+    """Draw `over_temperature_<sensor>` for each sensor with polynomials; return the event as `write_pictures` does."""
     return write_pictures(
         [
             Picture(

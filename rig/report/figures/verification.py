@@ -59,12 +59,12 @@ def write_pictures(pictures: Sequence[Picture], folder: Path) -> tuple[RunEvent,
 
 
 def write_figures(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
-    """Draw `verification_<sensor>_before` (if there is one) and `…_after` of each verification of a run."""
+    """Draw the verifications of a run into `folder`, and return the event, as `draw_verifications` does."""
     return draw_verifications(outcome.verifications.values(), folder)
 
 
 def draw_verifications(verifications: Iterable[Verification], folder: Path) -> tuple[RunEvent, ...]:
-    """Draw each verification, as PNG and SVG, into `folder`."""
+    """Draw `verification_<sensor>_before`, if any, and `…_after` for each; return as `write_pictures` does."""
     pictures = [
         Picture(
             f"verification_{verification.sensor}_{when}",

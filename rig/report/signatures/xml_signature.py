@@ -59,7 +59,7 @@ def _method(certificate: Certificate) -> SignatureMethod:
 
 
 def _verify(root: Any, certificate: Certificate, method: SignatureMethod) -> Any:
-    """Return the content that the certificate's key has signed. Raise SignXMLException."""
+    """Return the content that the certificate's key has signed. Raise SignXMLException for a wrong signature."""
     form = XAdESSignatureConfiguration(
         location="./",
         expect_references=3,

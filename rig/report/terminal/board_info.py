@@ -35,7 +35,7 @@ class BoardSensorRow:
 
 @dataclass(frozen=True, slots=True)
 class BoardInfo:
-    """The board at `port`."""
+    """The board at `port`: its identity, its status and its sensors."""
 
     port: str
     identity: BoardIdentity

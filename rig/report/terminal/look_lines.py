@@ -75,7 +75,7 @@ def _describe_table(path: Path, layout: TableLayout, guess: LogColumns) -> Itera
 
 
 def describe_convention(convention: Convention | None, *, is_order_named: bool) -> Iterator[str]:
-    """Yield lines on the quaternions' direction, reference and clock, as a comparison with the gyroscope shows.
+    """Yield lines on the quaternions' direction, reference and clock, found by comparison with the gyroscope.
 
     The order of the four numbers is included unless the log names it (`is_order_named`).
     """
@@ -166,7 +166,7 @@ def _row(name: str, text: str) -> str:
 
 
 def _spell(*entries: Mapping[str, Any]) -> str:
-    """Return text that has the names of the columns (`entries`) of one quantity, then their unit."""
+    """Return a text on the columns (`entries`) of one quantity: their names, then their unit."""
     names = " ".join(str(entry["column"]) for entry in entries)
     entry = entries[0]
     unit = str(entry.get("unit", "date and time" if len(entries) == 1 else ""))

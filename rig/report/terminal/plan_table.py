@@ -39,7 +39,10 @@ class DryRun:
 
     @cached_property
     def account(self) -> "AttitudeAccount | None":
-        """The expected accuracy of the plan's attitudes; None without any. Raise the errors of `attitude_account`."""
+        """The expected accuracy of the accelerometers by the plan's attitudes; None if they calibrate none.
+
+        Raise the errors of `attitude_account`.
+        """
         if self.config.procedure.accelerometer_order == 0:
             return None
         from rig.analysis.design.attitude_information import attitude_account

@@ -26,7 +26,7 @@ ALL_OF_IT = "the same command with --all"
 
 
 def print_outcome(document: ResultDocument, *, as_json: bool, whole: bool = False, folder: Path | None = None) -> None:
-    """Print a result that is not stored: as JSON for machines; for people its ending or, if `whole`, all tables.
+    """Print a result that is not stored: as JSON for machines, for people in short or, if `whole`, with all tables.
 
     `folder` is the folder of its run, which remedies name.
     """
@@ -41,7 +41,10 @@ def print_outcome(document: ResultDocument, *, as_json: bool, whole: bool = Fals
 
 
 def print_kept(folder: Path, document: ResultDocument, since: Sequence[str] = (), *, as_json: bool = False) -> None:
-    """Print the end of the finished run in `folder`. `since`: lines that compare it with the last calibrations."""
+    """Print the result of the finished run in `folder`, in short or as JSON.
+
+    `since`: lines that compare the result with the last calibrations.
+    """
     if as_json:
         print(document.text())
         for line in since:  # the JSON does not contain these lines

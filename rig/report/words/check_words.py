@@ -40,7 +40,8 @@ def words_of(check: CheckEntry) -> CheckWords | None:
 def words_of_name(name: str) -> CheckWords | None:
     """Return the words of the check `name`, which may include sensor, quantity and sweep; None if it names no check.
 
-    Of the parts between points, the last one that names a check is decisive, because a sensor may be called so too.
+    The name's parts are separated by points. The last part that is a check's name decides, because a sensor may have
+    such a name too.
     """
     prefixes = ["", *(f"{quantity}_" for quantity in _quantities())]
     candidates = (part.removeprefix(prefix) for part in reversed(name.split(".")) for prefix in prefixes)

@@ -50,7 +50,7 @@ class Guess:
     """A guess at the columns.
 
     - `columns`, `rate_hz`: the columns' names, and the sample rate.
-    - `time`, `sequence_wrap`, `clock`: the sections of these names.
+    - `time`, `sequence_wrap`, `clock`: the values of these keys for the section `lines`.
     - `units`: unit and scale of each triad, by its letter.
     - `reasons`, `gaps`: sentences about the grounds of the guess, and about facts that the user must look up.
     """

@@ -93,7 +93,11 @@ class AutopilotLink:
 
     # -- the dialogue ----------------------------------------------------------------------------------------------
     def parameters(self, needed: Iterable[str], others: Iterable[str] = ()) -> Mapping[str, AutopilotParameter]:
-        """Read the parameters `needed`, and those of `others` that exist. Raise SensorError `autopilot_silent`."""
+        """Return the parameters, `needed` and `others`, that the autopilot sends on request.
+
+        Only for a needed one requests are repeated until the time-out. Raise SensorError `autopilot_silent` if none
+        comes.
+        """
         needed = set(needed)
         names = needed | set(others)
         with self.own_port.news:

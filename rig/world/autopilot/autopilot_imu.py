@@ -50,7 +50,7 @@ class LowPass:
 
 
 class SimulatedImu:
-    """An IMU, number `index` of its autopilot. `step` reads it; `rate` and `force` are the firmware's values."""
+    """An IMU, number `index` of its autopilot; `step` reads it, `rate` and `force` are the values that result."""
 
     def __init__(
         self,

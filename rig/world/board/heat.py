@@ -19,7 +19,7 @@ class HeatedPart:
         self._offset_k = 0.0
 
     def advance(self, body_c: float, heater_w: float, dt_s: float) -> None:
-        """Let the part follow the body's temperature for `dt_s`; the heater's `heater_w` also warms its elements."""
+        """Let the part follow the body's temperature for `dt_s`; the heater's power also warms the elements."""
         section = self._section
         self._thermometer_c += (body_c - self._thermometer_c) * _settle(dt_s, section.thermometer_lag_s)
         self._element_c += (self._thermometer_c - self._element_c) * _settle(dt_s, section.element_lag_s)

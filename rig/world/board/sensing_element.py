@@ -9,7 +9,7 @@ UNLIMITED_RANGE = 1e3  # rad/s and g: no part has such a range
 
 
 class ElementFault(StrEnum):
-    """Faults of a sensing element. Its noise and its electronics do not change."""
+    """Faults of a sensing element, which change neither its noise nor its electronics."""
 
     STUCK = "stuck"  # forever the motion at which the fault began
     SATURATED = "saturated"  # a motion far beyond its range, on every axis

@@ -128,7 +128,7 @@ def _build_accelerometer_truth(simulated: SimulatedAccelerometerSection, holds_a
     """Return the emulated accelerometer's errors.
 
     The configured bias is to be added to a reading in order to correct it. `AccelerometerTruth` has the bias that the
-    reading contains, which is minus that.
+    reading contains, which has the opposite sign.
     """
     return AccelerometerTruth(
         scale=simulated.scale,

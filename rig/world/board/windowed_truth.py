@@ -85,7 +85,7 @@ class SimulatedTruth:
         return SensorTruth(self._config.sensors[name], self._world.sensors[name])
 
     def _seed(self, name: str) -> np.random.SeedSequence:
-        """Return the seed of a sensor's drift, which all mounts of the laboratory use."""
+        """Return the seed of a sensor's drift, with which the laboratory simulates the sensor too."""
         return np.random.SeedSequence([self._world.seed, sorted(self._world.sensors).index(name)])
 
 

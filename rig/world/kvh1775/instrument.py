@@ -154,7 +154,7 @@ class SimulatedKvh1775:
         self._before = now
 
     def _send(self, at_s: float) -> None:
-        """Send a message with the readings at `at_s`, in the format of the settings, and tests that are due."""
+        """Send a message with the readings at `at_s`, in the format of the settings, then test results that are due."""
         memory = self._memory
         delta = memory["ROTFMT"] == "DELTA"
         now = cast(Sequence[float], self._before)

@@ -29,7 +29,7 @@ PATIENT_TICKS = 240  # 12 s while a client's constructor holds the child's inter
 
 
 class ChildLink:
-    """One child process. The reader thread calls `on_message`; `on_lost` is called once, by the reader or the guard."""
+    """One child process. Threads of the link call `on_message` for each message, and `on_lost` once if it is lost."""
 
     def __init__(
         self,

@@ -141,14 +141,14 @@ def _list_parameters(links: Links) -> list[float]:
 
 
 def _kinematics(robot: Robot) -> bytes:
-    """Return the arm's own links, including the calibration, and whether they are calibrated."""
+    """Return the sub-package of the arm's own links with their calibration, and whether they are calibrated."""
     angles = [link.theta_rad for link in robot.links]
     status = CALIBRATED if robot.links != links(nominal=robot.model.nominal) else NOT_CALIBRATED
     return struct.pack(">6I24dI", *[1] * 6, *angles, *_list_parameters(robot.links), status)
 
 
 def _configuration(robot: Robot) -> bytes:
-    """Return the configuration: nominal geometry, and joint limits as restricted by the safety settings."""
+    """Return the sub-package of the nominal geometry, and of joint limits as restricted by the safety settings."""
     model = robot.model
     positions = [value for limit in model.limit_rad for value in (-limit, limit)]
     speeds = [value for speed in model.speed_rad_s for value in (speed, ACCELERATION_LIMIT_RAD_S2)]

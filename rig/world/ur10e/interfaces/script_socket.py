@@ -110,7 +110,7 @@ class ScriptSession:
         return b""
 
     def receive(self, data: bytes) -> bytes:
-        """Read programs from the client; in local control report that they are not accepted."""
+        """Carry out the client's programs, or in local control report that none is accepted; return no answer."""
         try:
             for lines in self._reader.feed(data):
                 if self._read_only or self._robot.local_control:
