@@ -9,7 +9,7 @@ from typing import Any, TextIO
 class _Unbroken:
     """A text stream whose writes never fail: after an OSError, this and all later output is discarded.
 
-    `lost`: the error; None without one, or if the reader closed the pipe.
+    `lost`: the error; None if there was none, or if the reader closed the pipe.
     """
 
     def __init__(self, stream: TextIO) -> None:

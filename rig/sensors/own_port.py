@@ -97,7 +97,7 @@ class OwnPort:
             raise _complete_error(self._faults.silent, f" for {silent_s:.1f} s")
 
     def wait(self, until: Callable[[], bool], timeout_s: float) -> bool:
-        """Wait until a condition is true; return whether it was in time. Raise a fault that occurs meanwhile."""
+        """Wait until a condition is true; return False after the time-out. Raise a fault that occurs meanwhile."""
         with self.news:
             done = self.news.wait_for(lambda: until() or self.fault is not None, timeout_s)
             if self.fault is not None:

@@ -132,7 +132,7 @@ def _fetch_session(
 ) -> Iterator[tuple[Board, str, "CalibratedByBoard"]]:
     """Read the board's last session; yield the board, the sensor's name and the result.
 
-    Raise Refused `another_sensor` if it is of no configured sensor.
+    Raise Refused `another_sensor` if the session was with a sensor that is not configured.
     """
     from rig.runner.by_hand.on_board import read_kept_solution
 

@@ -140,7 +140,7 @@ def _write_signed(options: Namespace, by: "Signatory | None") -> tuple[list[Path
 def _make_digital(
     certificate: "Certificate", by: "Signatory | None", reason: "Reason", left_out: list[Refused] | None
 ) -> dict[str, bytes]:
-    """Return the digital certificate by its file name, signed if there is a signatory; empty if it cannot be made.
+    """Return the digital certificate by its file name, signed if there is a signatory; empty if it could not be made.
 
     The reason is appended to `left_out`, or printed if that is None.
     """

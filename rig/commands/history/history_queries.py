@@ -65,7 +65,7 @@ def list_calibrations(options: Namespace) -> int:
 
 
 def show(options: Namespace) -> int:
-    """Print one calibration, or those of a sensor's last run, and the run's location. Raise `not_in_history`."""
+    """Print one calibration, or all in a sensor's last run, and the run's location. Raise `not_in_history`."""
     with open_named_history(options) as history:
         pasts = _find_shown(history, options.calibration)
         (kept,) = history.kept(pasts[-1].run_id)
@@ -86,7 +86,7 @@ def show(options: Namespace) -> int:
 
 
 def _find_shown(history: History, named: str) -> list[Past]:
-    """Return the calibration with the number `named`, or those of the last run of the serial number `named`.
+    """Return the calibration with the number `named`, or the calibrations in the last run of that serial number.
 
     Raise Refused `not_in_history`.
     """
@@ -256,7 +256,7 @@ def _select_pasts(history: History, selection: Selection) -> list[Past]:
 
 
 def _find_run_folders(folders: list[Path], *, unsolved: bool) -> Iterator[Path]:
-    """Yield the run folders among and within `folders`; with `unsolved`, also those without a result.
+    """Yield the run folders among and within `folders`; with `unsolved`, also folders without a result.
 
     A folder without any run is yielded too, so that it is refused by name.
     """
@@ -270,8 +270,9 @@ def _find_run_folders(folders: list[Path], *, unsolved: bool) -> Iterator[Path]:
 def _recompute_finished(folder: Path, history: History, *, solve: bool) -> FinishedRun:
     """Return the run with its result recomputed from its recordings, unless the history already has it.
 
-    A result.json alone proves nothing, so it must agree with the recordings; with `solve` it is replaced if it does
-    not. Raise Refused `no_recording`, `result_not_of_recording`, and the errors of the recordings' solution.
+    A result.json alone proves nothing, so it must agree with the recordings; with `solve` a result.json that does not
+    agree is replaced. Raise Refused `no_recording`, `result_not_of_recording`, and the errors of the recordings'
+    solution.
     """
     claimed = None if solve and not (folder / RESULT).exists() else read_finished_run(folder)
     if claimed is not None:

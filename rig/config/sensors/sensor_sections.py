@@ -190,7 +190,7 @@ class SensorSection(Section):
 
     @property
     def own_port(self) -> tuple[str, str] | None:
-        """The sensor's own port and the key in its section that states the port; None without one."""
+        """The sensor's own port and the key in its section that states the port; None if it has no port of its own."""
         if self.serial is not None:
             return "serial.port", self.serial.port
         return None if self.mavlink is None else ("mavlink.port", self.mavlink.port)

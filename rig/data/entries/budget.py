@@ -55,7 +55,7 @@ class BudgetEntry(Entry):
 
 
 def expand_uncertainties(budget: BudgetEntry | None, covariance: Sequence[Sequence[float]]) -> Sequence[float]:
-    """Return U (6,) of scale and bias from the budget; without one, two standard deviations from the covariance."""
+    """Return U (6,) of scale and bias from the budget, or else two standard deviations from the covariance."""
     if budget is not None:
         return budget.expanded
     return [COVERAGE_FACTOR * covariance[i][i] ** 0.5 for i in range(len(covariance))]

@@ -38,7 +38,7 @@ STATE_WORDS = {
 
 
 def recompute_csv(outcome: RecomputeOutcome) -> str:
-    """Return CSV: a line for each calibration with its most changed parameter, and for each run without any."""
+    """Return CSV, a line for each calibration (its most changed parameter) and for each run without calibrations."""
     out = io.StringIO(newline="")
     writer = csv.DictWriter(out, COLUMNS, lineterminator="\n", restval="")
     writer.writeheader()
@@ -101,7 +101,7 @@ def _lines(outcome: RecomputeOutcome) -> Iterator[dict[str, str]]:
 
 
 def _line(compared: ComparedResult, past: Past | None) -> dict[str, str]:
-    """Return the cells of a calibration, or of a result without one."""
+    """Return the cells of the calibration `past` or, if `past` is None, of a result without calibrations."""
     move = _most_moved(compared, past)
     has_moved = past is not None and past.id in compared.moved
     return {

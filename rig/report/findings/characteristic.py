@@ -37,8 +37,8 @@ class Units:
 class Series:
     """A characteristic's names in a history, `prefix` + label for each number, and the `words` that describe them.
 
-    `drawn`: whether the history draws the numbers. `opposite`: whether it stores them with the sign opposite to that in
-    certificates.
+    `drawn`: whether the history draws the numbers. `opposite`: whether the history stores the numbers with the opposite
+    sign of certificates.
     """
 
     prefix: str

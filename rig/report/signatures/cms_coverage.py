@@ -95,7 +95,7 @@ def _rebuild(container: Any, info: Any, signer: Any, version: str) -> Any:
 
 
 def _drop_parameters(algorithm: Any) -> Any:
-    """Return the algorithm without parameters, or with NULL if the original has it; `PSS_METHOD` keeps its own."""
+    """Return the algorithm without parameters, or with NULL if the original has it; `PSS_METHOD` keeps them."""
     name = algorithm["algorithm"].native
     if name == PSS_METHOD:
         return algorithm

@@ -113,8 +113,8 @@ def _other_name(certificate: "Certificate", expected: str | None) -> str:
 def find_unvouched(chain: "Sequence[Certificate]", trust: Trust) -> list["Certificate"]:
     """Return those certificates of a signer's `chain`, after the first one, whose content nothing verifies.
 
-    The signature itself identifies the first certificate. Each further one is verified if it is trusted, or if a
-    trusted certificate or one in the chain has issued it.
+    The signature itself identifies the first certificate. Each further certificate is verified if it is trusted, or if
+    a trusted certificate or one in the chain has issued it.
     """
     from cryptography.hazmat.primitives.serialization import Encoding
     from cryptography.x509 import load_der_x509_certificate

@@ -17,7 +17,7 @@ def heading_for(budget: BudgetEntry | None) -> str:
 
 
 def heading_of(factors: Sequence[float]) -> str:
-    """Return the heading of a column of U with its coverage factor, the largest if they differ."""
+    """Return the heading of a column of U with the largest of its coverage `factors`."""
     printed = sorted({round(factor, 2) for factor in factors})
     return f"± U (k {'=' if len(printed) == 1 else '≤'} {printed[-1]:g})"
 

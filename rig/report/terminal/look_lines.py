@@ -98,8 +98,8 @@ def describe_convention(convention: Convention | None, *, is_order_named: bool) 
 class TriedSolutions:
     """The solutions that were tried for a log.
 
-    - `columns`: the file of its column map, if any.
-    - `at_rest`: why it is not a log at rest; None if it is one.
+    - `columns`: the file of the log's column map, if any.
+    - `at_rest`: why the log was not recorded at rest; None if it was.
     - `up`: the axis that points upwards; `finds_clock`: whether the reference has a clock of its own.
     - `turns`, `attitudes`: the trials, None if none was made.
     """

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 class DryRun:
     """A plan with its configuration, and with predictions that are computed on demand.
 
-    `model`: the turner's model, None if its section does not state it. `repeated`: whether a verification repeats the
-    movement.
+    `model`: the turner's model, None if the turner's section does not state the model. `repeated`: whether a
+    verification repeats the movement.
     """
 
     model: str | None
@@ -39,7 +39,7 @@ class DryRun:
 
     @cached_property
     def account(self) -> "AttitudeAccount | None":
-        """The expected accuracy of the accelerometers by the plan's attitudes; None if they calibrate none.
+        """The accuracy of accelerometers to expect from the plan's attitudes; None if none is calibrated.
 
         Raise the errors of `attitude_account`.
         """

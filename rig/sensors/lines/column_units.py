@@ -41,7 +41,7 @@ def choose_unit(kind: str, unit: dict[str, Any], values: Array, still: NDArray[n
 
 
 def _choose_rate_unit(values: Array, still: NDArray[np.bool_]) -> tuple[dict[str, Any], str]:
-    """Return the unit of a gyroscope's readings by their size, and the reason why it is uncertain."""
+    """Return the unit of a gyroscope's readings by their size, and the reason why the unit is uncertain."""
     if (values == np.rint(values)).all() and np.abs(values).max() > MIN_COUNT:
         return {"unit": "deg/s", "lsb_per_unit": UNSTATED}, "steps of a converter: state lsb_per_unit by its data sheet"
     turned = values - np.median(values[still], axis=0)

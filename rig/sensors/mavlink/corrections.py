@@ -158,7 +158,7 @@ def read_correction(names: ParameterNames, parameters: Mapping[str, float]) -> O
 
 
 def delay_s(names: ParameterNames, parameters: Mapping[str, float]) -> float:
-    """Return the delay of rates, s, due to a second-order Butterworth low-pass: √2 / (2π cut-off); 0 without one."""
+    """Return the delay of rates, s, due to a second-order Butterworth low-pass, √2 / (2π cut-off); 0 without filter."""
     cutoff_hz = parameters.get(names.filters[0], 0.0) if names.filters else 0.0
     return float(np.sqrt(2.0) / (2.0 * np.pi * cutoff_hz)) if cutoff_hz > 0 else 0.0
 

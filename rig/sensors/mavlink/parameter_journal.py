@@ -53,7 +53,7 @@ class ParameterChange:
         return json.dumps({**head, **sets}, indent=2) + "\n"
 
     def keep(self) -> None:
-        """Write the file that restores the old parameters. Raise Refused `autopilot_not_kept`, also if it exists."""
+        """Write the new file that restores the old parameters. Raise Refused `autopilot_not_kept`."""
         try:
             _write(self.backup, self.serialize(), exclusive=True)
         except OSError as error:
@@ -82,7 +82,7 @@ class ParameterChange:
 
 
 def find_change(autopilot_id: str) -> ParameterChange | None:
-    """Return the autopilot's change in the journal; None without one. Raise Refused `not_an_autopilot_file`."""
+    """Return the autopilot's change in the journal, None if it has none. Raise Refused `not_an_autopilot_file`."""
     path = _journal_path(autopilot_id)
     return read_change(path) if path.exists() else None
 

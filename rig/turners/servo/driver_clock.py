@@ -21,7 +21,7 @@ class Clock(Protocol):
     def wait_for(self, changed: threading.Condition, done: Callable[[], bool], timeout_s: float) -> bool:
         """Wait until `done()` is true; return its last value.
 
-        It is tested at each notification of `changed`, which the caller has locked.
+        `done` is called at each notification of `changed`, which the caller has locked.
         """
 
 

@@ -22,8 +22,9 @@ BRAKE_MS, BRAKE_RAMP_MS = 200, 100  # the profile of a stop
 def make_ready(bus: Bus, watchdog: int) -> None:
     """Hold the shaft in place and arm the watchdog. Raise Refused if the servo does not keep a setting, and BusError.
 
-    `watchdog` is in the register's units. Operating mode and drive mode are in the EEPROM and written only if they
-    differ. Writing the mode sets the profile to zero, the fastest motion, so the order is mode, profile, goal, torque.
+    `watchdog` is in the register's units. Operating mode and drive mode are in the EEPROM and written only if their
+    values differ from the wanted ones. Writing the mode sets the profile to zero, the fastest motion, so the order is
+    mode, profile, goal, torque.
     """
     for register, wanted in ((DRIVE_MODE, TIME_BASED), (OPERATING_MODE, EXTENDED_POSITION)):
         if bus.look_up(register) != (wanted,):

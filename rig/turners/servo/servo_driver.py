@@ -308,7 +308,7 @@ class Servo:
             self._stopper.begin()
 
     def _lets_go(self) -> bool:
-        """Return whether the servo's motor is off: it shut down, or another program switched its torque off."""
+        """Return whether the motor is off, because the servo shut down or another program switched off its torque."""
         return self._linked.torque_off or bool(self.latest.hardware_error & self._report.shutdown)
 
     def _await_rest(self, since_s: float, timeout_s: float) -> bool:

@@ -58,7 +58,7 @@ def _stance(report: ServoReport) -> str:
 
 
 def _problems(plans: Sequence[Plan], section: ServoSection, report: ServoReport | None) -> list[Problem]:
-    """Return all problems of the plans, and with a report also those of the servo."""
+    """Return all problems of the plans, and with a `report` also the problems of the servo."""
     problems = list(dict.fromkeys(problem for plan in plans for problem in find_step_problems(plan)))
     motions = [motion for plan in plans for motion in plan.motions]  # one problem of each kind is reported
     if report is None:

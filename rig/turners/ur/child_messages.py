@@ -34,7 +34,7 @@ class BrakeRequest:
 
 @dataclass(frozen=True, slots=True)
 class Alive:
-    """The parent's sign of life; without it the child stops the arm itself. It is not answered."""
+    """The parent's sign of life; without it the child stops the arm itself. This message is not answered."""
 
 
 Request = TakeControl | MoveRequest | BrakeRequest | Alive

@@ -21,8 +21,8 @@ from rig.world.ur10e.motion.forward_kinematics import rotation_from_vector
 class SensorTruth:
     """A sensor with its true errors, `gyro` and `accelerometer`; `accelerometer` is None if no accelerometer is read.
 
-    `powered_s`: when the sensor gets power and begins to warm up. If a heated `part` is given, the part's temperature
-    is used instead. `data_rate_ppm`: the error of the sensor's own oscillator, positive if it is fast.
+    `powered_s`: the time at which the sensor gets power and begins to warm up, unless it has the temperature of a
+    heated `part`. `data_rate_ppm`: the error of the sensor's own oscillator, positive if it is fast.
     """
 
     def __init__(

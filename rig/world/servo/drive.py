@@ -41,7 +41,7 @@ class ServoFaults:
 class Drive:
     """The motor, controlled by its registers `memory`. Times are the world's, s.
 
-    `torque`: whether it holds its shaft; `fed_s`: when its watchdog was last fed.
+    `torque`: whether the motor holds the shaft; `fed_s`: the time at which the watchdog was last reset.
     """
 
     def __init__(self, truth: ServoTruth, model: Model, memory: ServoMemory, time_s: float) -> None:
@@ -111,7 +111,7 @@ class Drive:
         self._memory["Goal Position"] = self._pulses(time_s, noisy=False)
 
     def torque_off(self, time_s: float) -> None:
-        """Release the shaft: its gear holds it, or it falls by at most half a revolution."""
+        """Release the shaft, which the gear then holds, or which falls by at most half a revolution."""
         self.torque = False
         self._memory["Torque Enable"] = 0
         fall = radians(self._truth.fall_deg_s)

@@ -41,7 +41,7 @@ class ProfileStart(NamedTuple):
 
 
 def plan_timed(start: ProfileStart, goal_rad: float, total_s: float, ramp_s: float, limit_rad_s: float) -> Profile:
-    """Plan a move of `total_s` with ramps of `ramp_s`; it takes longer if it would exceed `limit_rad_s`."""
+    """Plan a move of `total_s` with ramps of `ramp_s`; a move that would exceed `limit_rad_s` takes longer."""
     distance_rad = goal_rad - start.angle_rad
     ramp_s = min(ramp_s, total_s / 2)
     cruise_rad_s = (distance_rad - start.rate_rad_s * ramp_s / 2) / (total_s - ramp_s)

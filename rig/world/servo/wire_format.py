@@ -76,7 +76,7 @@ class Receiver:
             yield packet
 
     def _next(self) -> ServoPacket | None:
-        """Return the first complete packet, and drop it and the bytes before it from the buffer; else None."""
+        """Drop the first complete packet and all bytes before it from the buffer; return the packet, or None."""
         buffer = self._buffer
         while True:
             start = buffer.find(HEADER)

@@ -122,7 +122,7 @@ class Robot:
 
     @robot_mode.setter
     def robot_mode(self, mode: RobotMode) -> None:
-        """Set the mode. Every change of it and of the safety mode is reported at the primary interface."""
+        """Set the mode; a change is reported at the primary interface, as is a change of the safety mode."""
         if mode != self._robot_mode:
             self.messages.report(ErrorReport(MODE_CHANGED, mode, ReportLevel.INFO))
         self._robot_mode = mode
@@ -410,7 +410,7 @@ class Robot:
     # -- outputs of RTDE ---------------------------------------------------------------------------------------------
     @property
     def speed_scaling(self) -> float:
-        """The joints' speed relative to that permitted by the slider; clients multiply it by the slider's fraction.
+        """The joints' speed divided by the speed that the slider permits; clients multiply it by the slider's fraction.
 
         It is 0 while no program runs, as in logs of a UR3 of the CB3 series and of a UR10e.
         """

@@ -29,7 +29,7 @@ PATIENT_TICKS = 240  # 12 s while a client's constructor holds the child's inter
 
 
 class ChildLink:
-    """One child process. Threads of the link call `on_message` for each message, and `on_lost` once if it is lost."""
+    """One child process. Threads of the link call `on_message` for each message, and `on_lost` if the link is lost."""
 
     def __init__(
         self,
@@ -73,7 +73,7 @@ class ChildLink:
     def start(self) -> None:
         """Start the child process, whose first message is `Connected` or `RequestFailed`.
 
-        Watch for silence of the child, and of the controller if it is a process of this computer.
+        Watch for silence of the child, and of a controller that is a process of this computer.
         """
         ip = resolve_address(self._host)
         self._is_remote = ip is None or not ip.is_loopback

@@ -22,7 +22,7 @@ RESTART_REMEDY = "Restart the controller if it happens again"
 
 
 def impossible_state(state: ArmState) -> Problem | None:
-    """Return the problem of a state with values that are not finite, or impossible for an arm; None without one."""
+    """Return the problem of a state with values that are not finite or not possible for an arm; None if possible."""
     if _is_possible(state):  # five hundred states a second are; to name what is wrong takes ten times as long
         return None
     values = {

@@ -47,7 +47,7 @@ def _jacobian(q: Sequence[float] | Array, links: Links) -> Array:
 def solve_inverse_kinematics(pose: Sequence[float], start_rad: Joints, links: Links = NOMINAL) -> Joints:
     """Return the joint angles for the flange's `pose` (m, rotation vector rad), by Newton's method from `start_rad`.
 
-    Raise `ProgramError` if it does not converge: out of reach, or singular on the way.
+    Raise `ProgramError` if the method does not converge, because the pose is out of reach or the arm becomes singular.
     """
     rotation, position = np.array(rotation_from_vector(pose[3:])), np.array(pose[:3])
     q = np.array(start_rad)

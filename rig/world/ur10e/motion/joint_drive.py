@@ -30,7 +30,7 @@ Shaken = tuple[int, float, float, float]
 class Deflection(NamedTuple):
     """The deflection, rad, of a joint that yields to its acceleration, at a time t (s) in a tick.
 
-    It is end + (start + slope t) exp(−t/τ), with τ the drive's `yield_time_s`.
+    The deflection is end + (start + slope t) exp(−t/τ), with τ the drive's `yield_time_s`.
     """
 
     joint: int

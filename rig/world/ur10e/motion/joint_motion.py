@@ -294,7 +294,8 @@ class JointMotion:
     def _map(self, start: Joints, end: Joints) -> tuple[Joints, Joints]:
         """Return the offset and gain (6,) that convert each joint's target into its angle without ripple.
 
-        They are chosen such that the joints, with their ripple, are exactly on target at the path's two ends.
+        Offset and gain are chosen such that the joints, with their ripple, are exactly on target at the path's two
+        ends.
         """
         first = [r.smooth(q) for r, q in zip(self._ripples, start, strict=True)]
         last = [r.smooth(q) for r, q in zip(self._ripples, end, strict=True)]

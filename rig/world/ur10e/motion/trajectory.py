@@ -144,7 +144,7 @@ def plan_soft_joint_move(
 def plan_speed_change(q_rad: Joints, from_rad_s: Joints, to_rad_s: Joints, acceleration_rad_s2: float) -> Trajectory:
     """Plan a change of velocity, in which the joint whose speed changes most has the given acceleration.
 
-    Afterwards the joints keep the new velocity, or rest if it is zero.
+    Afterwards the joints keep the new velocity, or rest if the new velocity is zero.
     """
     change = tuple(b - a for a, b in zip(from_rad_s, to_rad_s, strict=True))
     ramp_s = max(abs(c) for c in change) / acceleration_rad_s2

@@ -1,7 +1,7 @@
 """The program that ur_rtde uploads, simulated by its register protocol, not by its text.
 
-A client writes a command into input integer register 0. When it is done, the program answers 2 in output integer
-register 0; the client writes 0, and the program answers 1 (ready). Real-time commands are never answered 2.
+A client writes a command into input integer register 0. When the command is done, the program answers 2 in output
+integer register 0; the client writes 0, and the program answers 1 (ready). Real-time commands are never answered 2.
 """
 
 from collections.abc import Callable, Sequence

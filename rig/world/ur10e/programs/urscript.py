@@ -100,8 +100,8 @@ def check_brackets(lines: Sequence[str]) -> None:
 def parse_program(lines: Sequence[str]) -> tuple[str, Block]:
     """Return name and body of a program.
 
-    Raise `ProgramError` at the first line that is not simulated. If it calls an unknown function, the message is that
-    of the maker's compiler.
+    Raise `ProgramError` at the first line that is not simulated. If the line calls an unknown function, the message is
+    that of the maker's compiler.
     """
     check_brackets(lines)
     name = "unnamed"
