@@ -269,7 +269,7 @@ class SensorsConfig(Section):
     def check_link_rate(cls, sensors: dict[str, SensorSection], info: ValidationInfo) -> dict[str, SensorSection]:
         """Refuse sensors on a missing board, and data rates beyond the link's capacity.
 
-        A sensor to calibrate counts with the larger messages of those with its raw and with its corrected readings.
+        A sensor to calibrate sends raw and later corrected readings; the larger messages of the two count.
         """
         streams = _streams(sensors)
         if "board" not in info.data or not streams:

@@ -135,7 +135,7 @@ def rigs_document(states: Sequence[RigState], effects: Mapping[str, Sequence[Rig
 
 
 def chart_entry(chart: Chart) -> dict[str, Any]:
-    """Return a control chart; null for the first results."""
+    """Return a control chart for JSON; undefined numbers, such as the first deviations, are null."""
     return {
         "out_of_control": bool(chart.out_of_control) if chart.alarm.size else False,
         "deviation": _numbers(chart.deviation),

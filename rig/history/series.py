@@ -92,7 +92,7 @@ class Trend:
 
     @cached_property
     def chart(self) -> Chart | None:
-        """The Shewhart and EWMA charts."""
+        """The control charts of the values, by Shewhart and by EWMA; None for few results."""
         return chart(self.values, self.std) if self.enough else None
 
     @cached_property

@@ -97,7 +97,7 @@ def _rows(truth: _TruthFile, result: ResultDocument) -> Iterator[TruthRow]:
 
 
 def truth_lines(rows: Sequence[TruthRow]) -> Iterator[str]:
-    """Yield a line on the agreement of the result with the truth; none without rows."""
+    """Yield a line on the agreement of the result with the truth; nothing if there are no rows."""
     values = [
         (deviation, f"{row.row.name} {letter}{axis}")
         for row in rows

@@ -77,7 +77,8 @@ MAX_POSE_DIFFERENCE_RAD = radians(1)  # to the pose for which the operator's agr
 class Devices:
     """The connected devices.
 
-    - `turner`: turns the sensors; `kind`: its kind; `section`: its configuration; `report`: its state when connected.
+    - `turner`: the device that turns the sensors, with its `kind`, its configuration (`section`) and its `report` at
+      the connection.
     - `sources`: deliver the samples.
     - `mounted`: the sensors with their earlier calibrations.
     """

@@ -1,4 +1,4 @@
-"""Control charts of single results: Shewhart's for a jump, EWMA for a small persistent shift.
+"""Control charts of single results: Shewhart's for a jump, EWMA (a weighted moving average) for a small shift.
 
 A chart needs the mean and the standard deviation of a process in control. Estimates of these from a few first runs
 would give far more alarms than designed. So each result is compared with all earlier ones by Student's t (self-starting
@@ -69,7 +69,7 @@ def merge_charts(deviations: Array) -> Chart:
 
 
 def step(average: Array, deviation: Array, before: int) -> tuple[Array, float]:
-    """Return the EWMA with one more deviation, after `before` earlier ones, and its limit at that point.
+    """Return the moving `average` (EWMA) with one more deviation, after `before` earlier ones, and its limit.
 
     Shewhart's chart detects single outliers, so deviations are clipped to its limit before they enter the average.
     """

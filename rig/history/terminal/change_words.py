@@ -19,7 +19,7 @@ def select_changed(changes: Iterable[Change]) -> list[Change]:
 
 
 def comparison_in_words(changes: Sequence[Change]) -> str:
-    """Return the number of one sensor's significant changes, and the limit of E_n, in words."""
+    """Return the number of one sensor's significant changes, and the limit of the normalised error E_n, in words."""
     if not changes:
         return "the two have no value in common"
     changed, limits, compared = select_changed(changes), [change.limit for change in changes], changes[0].compared

@@ -72,7 +72,7 @@ def trend_lines(trends: Mapping[str, Trend]) -> Iterator[str]:
 
 
 def changes_table(title: str, changes: Sequence[Change]) -> FittingTable:
-    """Return a table of changes: each parameter before and now, the difference, and E_n.
+    """Return a table of changes: each parameter before and now, the difference, and the normalised error E_n.
 
     A narrow terminal shows values without U, which E_n includes; the narrowest also omits the values before.
     """

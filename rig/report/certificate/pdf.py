@@ -10,7 +10,7 @@ DESCRIPTIONS = {"result.json": "the result, of schema rig.result/1", "certificat
 
 
 def pdf_of(page: str, attachments: Mapping[str, bytes]) -> bytes:
-    """Return the page as PDF with `attachments` by name.
+    """Return the page as PDF with the attached files, which `attachments` gives by name.
 
     Raise Refused `no_weasyprint` if the extra `pdf` or a library that it needs is not installed.
     """

@@ -45,7 +45,7 @@ def px4_parameters(polynomials: Polynomials, numbers: Mapping[str, int]) -> Para
 
 
 def ardupilot_parameters(polynomials: Polynomials, numbers: Mapping[str, int]) -> Parameters:
-    """Yield the parameters INS_TCAL… of IMUs with a polynomial; zeros for a sensor without a polynomial."""
+    """Yield the parameters INS_TCAL… of IMUs with a polynomial; a sensor without a polynomial gets zeros."""
     for name, number in numbers.items():
         entries = polynomials.get(name, {})
         if not entries:

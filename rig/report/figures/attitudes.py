@@ -78,7 +78,7 @@ def _plots(outcome: Outcome, document: ResultDocument) -> Iterator[tuple[str, At
 
 
 def _mounting(outcome: Outcome, sensor: str) -> Array:
-    """Return the rotation (3, 3) from flange to the sensor's nominal axes; the identity for attitudes from a file."""
+    """Return the rotation (3, 3) from flange to the sensor's nominal axes, or the identity for a file's attitudes."""
     if sensor in outcome.external:
         return np.eye(3)
     return np.array(outcome.recordings[0].run.sensors[sensor].mounting)

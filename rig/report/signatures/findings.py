@@ -70,7 +70,7 @@ def not_as_signed(name: str, why: str) -> Refused:
 
 
 def list_signer_doubts(name: str, report: SignatureReport, why: str) -> list[Refused]:
-    """Return the problem of an unaltered file whose signer is unknown or not trusted; no problem if trusted.
+    """Return the problem of an unaltered file whose signer is unknown or not trusted, in a list; empty if trusted.
 
     `why`: the reason of the distrust, empty if the signer is trusted.
     """

@@ -212,7 +212,7 @@ def _name(step: Transfer | Rest) -> str:
 
 
 def _motion(step: Step) -> tuple[str, str, str]:
-    """Return a step's joint angles, speed and acceleration in degrees, as cells; blank for a rest."""
+    """Return a step's joint angles, speed and acceleration in degrees, as cells, which are blank for a rest."""
     if isinstance(step, (Rest, Dwell)):
         return "", "", ""
     turns = [

@@ -76,7 +76,7 @@ def print_shortest(shortest: ShortestRun, section: ProcedureSection, *, as_json:
 
 
 def shortest_document(shortest: ShortestRun, section: ProcedureSection) -> dict[str, Any]:
-    """Return the shortest run as JSON values; null for a missing plan or target."""
+    """Return the shortest run as JSON values; a missing plan or target is null."""
     shown = shortest.best or shortest.nearest
     return {
         "schema": "rig.shortest/1",

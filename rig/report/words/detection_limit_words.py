@@ -37,7 +37,7 @@ def list_limits(limits: Sequence[DetectionLimitEntry]) -> str:
 
 
 def size_words(size: float | None, unit: str) -> str:
-    """Return a size in its unit with two significant digits; "never" without a size."""
+    """Return a size in its unit with two significant digits, or "never" if `size` is None."""
     if size is None:
         return "never"
     factor, shown = FACTORS.get(unit, (1.0, f" {unit}"))

@@ -143,7 +143,7 @@ def _parts(
 
 
 def dof_text(dof: float) -> str:
-    """Return degrees of freedom as text, rounded down to an integer; large numbers with two digits."""
+    """Return degrees of freedom as text, rounded down to an integer; large numbers have two digits."""
     if not math.isfinite(dof):
         return "∞"
     return f"{math.floor(dof)}" if dof < 1e4 else small(dof)

@@ -47,7 +47,7 @@ def format_signed(value: float, decimals: int) -> str:
 
 
 def format_with_u(value: float, uncertainty: float) -> tuple[str, str]:
-    """Return a value and its U as texts; without a positive U, six digits and a dash."""
+    """Return a value and its U as texts; without a positive U the value has six digits, and a dash replaces U."""
     try:
         printed = round_to_u(float(value), float(uncertainty))
     except ValueError:
@@ -56,7 +56,7 @@ def format_with_u(value: float, uncertainty: float) -> tuple[str, str]:
 
 
 def plus_minus(value: float, uncertainty: float) -> str:
-    """Return a printed value ± U; the value alone without U."""
+    """Return a printed value ± U, or the value alone if U is not positive."""
     text, width = format_with_u(value, uncertainty)
     return text if width == NO_U else f"{text} ± {width}"
 

@@ -123,7 +123,7 @@ def _set_up_corrected(board: Board, name: str, section: SensorSection) -> BoardS
 
 
 def describe_corrected(sensor: RecordedSensor, calibration: Calibration, sensitivity_rad_s: float) -> RecordedSensor:
-    """Return the description of a sensor with rates corrected by the board, in counts of `sensitivity_rad_s`."""
+    """Return the description of a sensor whose rates the board corrects, in counts of `sensitivity_rad_s`."""
     raw = sensor.channel(RATE)
     assert raw.full_scale_counts is not None, "every driver states it"
     limit_rad_s = raw.full_scale_counts * raw.unit_per_count

@@ -18,7 +18,7 @@ _POWERS = 10.0 ** np.arange(MAX_DECIMALS + 1)
 
 
 def parse_numbers(text: NDArray[np.uint8], starts: NDArray[np.intp], ends: NDArray[np.intp]) -> Array:
-    """Return the numbers (n,) in `text` from `starts` to before `ends`; NaN for other text."""
+    """Return the numbers (n,) in `text` from `starts` to before `ends`; other text gives NaN."""
     if not len(starts):
         return np.empty(0)
     integer, digits = _sum_digits(text, starts, ends)

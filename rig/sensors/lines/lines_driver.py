@@ -151,7 +151,7 @@ class LinesDevice:
 
     @property
     def _rate_error(self) -> float:
-        """The relative error of the rate due to coarse times; 0 for fine ones."""
+        """The relative error of the rate due to coarse times; 0 if the times are fine."""
         step_s, span_s = self.time_step_s, self._span_s()
         if not is_coarse(step_s, self._rate_hz):
             return 0.0

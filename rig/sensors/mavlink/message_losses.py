@@ -17,7 +17,7 @@ LOSS_STEP = (
 
 @dataclass(slots=True)
 class LinkCounter:
-    """The count of one autopilot's messages over one link; all share one sequence number modulo 256.
+    """The count of one autopilot's messages over one link, which share one sequence number modulo 256.
 
     A message that comes after a later one counts as lost.
     """

@@ -97,5 +97,5 @@ class Messages:
         self._messages.append(message)
 
     def after(self, number: int) -> list[Message]:
-        """Return the messages after number `number`; all messages for 0."""
+        """Return the messages after number `number`; 0 selects all messages."""
         return [message for message in self._messages if message.number > number] if self.last > number else []

@@ -40,7 +40,7 @@ class MotionSegment:
 
 
 class Trajectory:
-    """A sequence of segments; at rest before the first and after the last."""
+    """A sequence of segments; the joints are at rest before the first and after the last."""
 
     def __init__(self, segments: Sequence[MotionSegment], end_rad: Joints | None = None) -> None:
         self._segments = tuple(segments)
