@@ -26,7 +26,7 @@ class Configured:
 def load_configured(
     config_path: Path, overrides: Sequence[str] = (), script: ScriptFile | Path | None = None
 ) -> Configured:
-    """Load a configuration. A `script` (a file, or loaded) replaces the configuration's procedure.
+    """Load and return a configuration. A `script` (a file, or loaded) replaces the configuration's procedure.
 
     Raise Refused `script_failed`, and what `load`, `load_procedures`, `load_script` and `first_phase` raise.
     """
@@ -45,7 +45,7 @@ def load_configured(
 
 
 def change_configured(configured: Configured, overrides: Sequence[str]) -> Configured:
-    """Change values of a configuration, given as for `load`. Raise Refused as `load_configured` does."""
+    """Return the configuration with `overrides` as for `load`. Raise Refused as `load_configured` does."""
     procedures: Procedures = {**load_procedures(), configured.script.procedure.name: configured.script.procedure}
     with script_errors(f"the section of {configured.script.name} fails"):
         loaded = parse(configured.loaded.text, "configuration", overrides, sections(procedures), turners.sections())

@@ -130,7 +130,7 @@ def export(
 
 
 def _parse(command: str, add: Callable[[ArgumentParser], None], words: Sequence[str], about: str | Path) -> Namespace:
-    """Parse `words` as the command line does, so that omitted arguments get the command's defaults."""
+    """Return `words` as the command line parses them, so that omitted arguments get the command's defaults."""
     parser = ArgumentParser(prog=f"rig {command}")
     add(parser)
     return parser.parse_args([*words, "--", str(about)])

@@ -95,7 +95,7 @@ class ConfigurationRefused(Refused):
 def load(
     path: str | Path, overrides: Sequence[str] = (), sections: Sections = STOCK_SECTIONS, turners: Turners = None
 ) -> Loaded:
-    """Read, override and validate a configuration file.
+    """Return the valid configuration in a file, after overrides.
 
     `overrides` are `path.to.key=value` with the value in YAML. `sections` are the procedures by name, with the model of
     their `procedure:` section; `turners` are the kinds of turners, with their models. Raise `ConfigurationRefused`
@@ -124,14 +124,14 @@ def load_sensors(path: str | Path, overrides: Sequence[str] = ()) -> tuple[Senso
 
 
 def load_statement(overrides: Sequence[str]) -> StatementConfig:
-    """Parse overrides of site and certificate without a file. Raise `ConfigurationRefused` as `load` does."""
+    """Return site and certificate from overrides without a file. Raise `ConfigurationRefused` as `load` does."""
     with _refusing_unreadable(SET):
         layered = merge_layers("{}", None, overrides)
     return _require(StatementConfig, layered.document, layered, SET)
 
 
 def load_as(model: type[Model], path: str | Path, give: str) -> Model:
-    """Read a file that holds one section, of this `model`. Raise `ConfigurationRefused` as `load` does.
+    """Return the section, of this `model`, that a file holds. Raise `ConfigurationRefused` as `load` does.
 
     `give` is the remedy for a file that cannot be read.
     """
@@ -147,7 +147,7 @@ def parse(
     sections: Sections = STOCK_SECTIONS,
     turners: Turners = None,
 ) -> Loaded:
-    """Validate the configuration in a text, as `load` does for a file; the text has no base file."""
+    """Return the valid configuration in a text, as `load` does for a file; the text has no base file."""
     with _refusing_unreadable(source):
         layered = merge_layers(text, None, overrides)
     return _validate_all(layered, source, sections, turners)
@@ -200,7 +200,10 @@ def _dump(document: Mapping[str, Any]) -> str:
 def _validate_rig(
     document: Mapping[str, Any], sections: Sections, turners: Turners, layered: MergedLayers
 ) -> tuple[RigConfig | None, list[str]]:
-    """Validate all sections except the world's. The procedure's name and the turner's kind select their models."""
+    """Return all sections except the world's, None if invalid, and the problems.
+
+    The procedure's name and the turner's kind select the models of their sections.
+    """
     procedure, problems = _validate_procedure(document.get("procedure", {}), sections, layered)
     turner, turner_problems = _validate_turner(document, turners, layered)
     rest = {**document, "procedure": procedure or ProcedureSection(name=""), "turner": turner or TurnerSection()}
@@ -215,7 +218,10 @@ def _validate_rig(
 def _validate_procedure(
     data: Any, sections: Sections, layered: MergedLayers
 ) -> tuple[ProcedureSection | None, list[str]]:
-    """Validate the procedure's section; if its name is unknown, by the keys of the procedure with the nearest name."""
+    """Return the procedure's section, None if invalid, and the problems.
+
+    If the name is unknown, the keys are compared with those of the procedure with the nearest name.
+    """
     name = data.get("name", DEFAULT_PROCEDURE) if isinstance(data, dict) else DEFAULT_PROCEDURE
     if sections is None:
         return ProcedureSection(name=str(name)), []
@@ -245,7 +251,10 @@ def _validate_procedure(
 def _validate_turner(
     document: Mapping[str, Any], turners: Turners, layered: MergedLayers
 ) -> tuple[TurnerSection | None, list[str]]:
-    """Validate the turner's section: `arm`, or `turner` with its kind. A wrong kind is a single problem."""
+    """Return the turner's section (`arm`, or `turner` with its kind), None if invalid, and the problems.
+
+    A wrong kind is a single problem.
+    """
     if "turner" not in document:
         if "arm" not in document:
             return None, ["arm: missing"]

@@ -36,7 +36,7 @@ class ScriptIdentity:
 
 
 def new_folder(out: Path | None, loaded: "Loaded", script: str, identity: ScriptIdentity) -> Path:
-    """Make a run folder with the configuration as used and the script. Raise Refused `run_folder`."""
+    """Make and return a run folder with the configuration as used and the script. Raise Refused `run_folder`."""
     parent = Path(loaded.config.output.folder)
     with refuse_unwritable(out or parent):
         folder = out or folder_of_its_own(parent, loaded.config.procedure.name)
@@ -89,7 +89,7 @@ def _write_all(folder: Path, texts: Mapping[str, str]) -> None:
 
 
 def folder_of_its_own(parent: Path, what: str) -> Path:
-    """Make a new folder named by the time and its content `what`, and numbered if another has the same name."""
+    """Make and return a new folder named by the time and its content `what`, and numbered if the name exists."""
     parent.mkdir(parents=True, exist_ok=True)
     name = f"{datetime.now(UTC):%Y-%m-%dT%H-%M-%SZ}-{what}"
     folder, numbers = parent / name, itertools.count(2)

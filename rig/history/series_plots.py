@@ -25,7 +25,7 @@ PLOT_COLUMNS = 3
 
 
 def draw_trends(subjects: Mapping[Subject, Mapping[str, Trend]], folder: Path) -> list[Path]:
-    """Draw `history_<serial number>_<quantity>` as PNG and SVG for each subject into the existing `folder`."""
+    """Draw `history_<serial number>_<quantity>` as PNG and SVG for each subject into `folder`; return the paths."""
     from matplotlib.figure import Figure
 
     names = set[str]()
@@ -54,7 +54,7 @@ def draw_trends(subjects: Mapping[Subject, Mapping[str, Trend]], folder: Path) -
 
 
 def draw_changes(title: str, changes: Sequence[Change], folder: Path, name: str) -> list[Path]:
-    """Draw the differences of two calibrations, each divided by its U, as `name` in PNG and SVG into a folder.
+    """Draw the differences of two calibrations, each divided by its U, as PNG and SVG `name`; return the paths.
 
     The band of a parameter is the limit beyond which it has changed; a changed parameter is red.
     """

@@ -108,7 +108,7 @@ class KeptRun:
 
 @contextmanager
 def open_history(where: str | HistoryAddress | None = None) -> Iterator["History"]:
-    """Open a history, given by file or URL, the user's own by default; create or migrate its tables if necessary.
+    """Yield a history, given by file or URL, by default the user's own; create or migrate its tables if necessary.
 
     Raise Refused `history_unreachable`, `history_too_old`, `history_too_new`, `not_a_history`, `missing_extra`;
     `history_gone` or `history_exchanged` if this process has opened it before and it is missing or has been replaced.
@@ -139,7 +139,7 @@ class History:
     engine: Engine
 
     def enter(self, finished: FinishedRun) -> EnteredRun:
-        """Add a run; if the history already has it, add only a new location of its folder.
+        """Add a run and return its entry; if the history already has it, add only a new location of its folder.
 
         Unlike `rig history import`, this does not compare the result with its recordings. Raise Refused
         `entry_not_kept`.
@@ -254,7 +254,7 @@ class History:
 
     @contextmanager
     def _writing(self) -> Iterator[Connection]:
-        """Begin a transaction that enters rows, and read the rows back after it."""
+        """Yield the connection of a transaction that enters rows, and read the rows back after it."""
         with self.engine.connect().execution_options(**{WRITE_OPTION: True}) as connection, connection.begin():
             journal.lock_out_writers(connection)
             before = journal.head(connection)

@@ -74,7 +74,7 @@ class Connector:
 
     @contextmanager
     def open(self) -> Iterator[Rig]:
-        """Connect everything and start recording; at the end stop the turner and close the file.
+        """Connect everything and start recording; yield the rig; at the end stop the turner and close the file.
 
         Nothing moves. Raise Refused if the turner, the board or a sensor differs from the configuration or from the
         recording so far, or if a sensor lacks the calibration for its corrected readings.
@@ -135,7 +135,7 @@ class Connector:
         return source
 
     def _connect_others(self, stack: ExitStack, acquisition: Acquisition) -> Iterator[SampleSource]:
-        """Connect the sensors with their own ports; for a verification, correct their readings on this computer."""
+        """Yield sources of the sensors with their own ports; for a verification, correct their readings here."""
         config, calibrated = self.loaded.config, self.phase.procedure.reads_corrected
         for port, kind, sections in group_by_port(config.sensors):
             on_samples: OnSamples = acquisition.on_samples
@@ -199,7 +199,7 @@ class Connector:
     def _record(
         self, stack: ExitStack, made_with: Provenance, turner: RecordedTurner, described: Mapping[str, RecordedSensor]
     ) -> Recording:
-        """Start the recording. Raise Refused if a device differs from those of earlier recordings."""
+        """Start and return the recording. Raise Refused if a device differs from those of earlier recordings."""
         self.resumed.refuse_other_instruments(made_with, described)
         with refusing():
             recorder = RunRecorder(

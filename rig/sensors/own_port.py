@@ -148,7 +148,7 @@ def open_device_port(
     owner: str = "",
     setting: str = "its name",
 ) -> DevicePort:
-    """Open a port. Raise SensorError `no_port`; the message names its `owner` and the `setting` that selects it."""
+    """Return an open port. Raise SensorError `no_port`; its message names the `owner` and the `setting` of the port."""
     try:
         return open_port(port, baud)
     except OSError as error:

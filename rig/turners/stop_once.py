@@ -41,7 +41,7 @@ class StopOnce:
                 self._thread.start()
 
     def outcome(self) -> StopOutcome:
-        """Stop, unless the stop has begun; wait for the outcome, which takes less than 1 s.
+        """Begin the stop unless it has begun, wait for its outcome, less than 1 s, and return the outcome.
 
         An interrupt during the stop is raised once the outcome is known. (In Python 3.11 an interrupted `join` takes
         the thread for ended, so an event is awaited.)

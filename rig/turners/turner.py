@@ -31,7 +31,7 @@ class Turner(Protocol):
         ...
 
     def report(self) -> Report:
-        """Read what the turner reports about itself, for the pre-flight check; nothing moves."""
+        """Return what the turner reports about itself, for the pre-flight check; nothing moves."""
         ...
 
     def check(self) -> None:

@@ -207,7 +207,7 @@ class Laboratory:
 
 
 def _build_motion_source(config: RigConfig, world: WorldSection) -> MotionSource:
-    """Build the simulation of the configured turner."""
+    """Return the simulation of the configured turner."""
     match config.turner:
         case ArmSection():
             return ArmMotionSource(config, world)

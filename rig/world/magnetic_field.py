@@ -81,7 +81,7 @@ class MagneticField:
 
 
 def build_magnetic_field(section: WorldSiteSection, iron: Sequence[IronSection] = ()) -> MagneticField:
-    """Build the field of the Earth (magnitude, dip, declination), of the room and of the arm's iron."""
+    """Return the field of the Earth (magnitude, dip, declination), of the room and of the arm's iron."""
     size_t = MICROTESLA_T * section.magnetic_field_ut
     dip, declination = radians(section.magnetic_dip_deg), radians(section.magnetic_declination_deg)
     north_t, west_t = size_t * cos(dip) * cos(declination), -(size_t * cos(dip)) * sin(declination)

@@ -303,7 +303,7 @@ class Network:
         return max([connection.deliver(idle, patient) for connection in due], default=0.0)
 
     def describe_lagging_clients(self) -> str:
-        """Describe the clients that lag, in words. Any thread may call this."""
+        """Return the clients that lag, in words. Any thread may call this."""
         behind = [connection.client for connection in tuple(self.connections) if connection.wait_s > 0.0]
         return ", ".join(behind) or "no client"
 

@@ -81,7 +81,7 @@ class SimulatedOperator:
         self._pending = action, max(self.time_s, self._hand.lies_from_s) + thought_s
 
     def _draw_mistake(self, say: str) -> Mistake | None:
-        """Draw the mistake of the next action, mostly None."""
+        """Return the mistake of the next action, drawn at random; mostly None."""
         draw = float(self._mind.uniform())
         for kind, probability in self._section.mistakes.items():
             draw -= probability

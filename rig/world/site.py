@@ -19,7 +19,7 @@ class SiteTruth:
 
 
 def build_site(section: WorldSiteSection) -> SiteTruth:
-    """Build the site from its section."""
+    """Return the site that a section describes."""
     rate = EARTH_RATE_RAD_S if section.latitude_deg is not None else 0.0
     latitude = radians(section.latitude_deg or 0.0)
     return SiteTruth(

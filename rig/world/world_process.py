@@ -127,7 +127,7 @@ class World:
         }
 
     def _listen_as_arm(self, turner: TurnerSection, section: WorldSection) -> list[PortListener]:
-        """Open the ports of the arm's controller, if an arm turns the sensors."""
+        """Open and return the ports of the arm's controller, if an arm turns the sensors."""
         if not isinstance(turner, ArmSection):
             return []
         robot = self.laboratory.robot
@@ -142,7 +142,7 @@ class World:
         return listeners
 
     def _listen(self, key: str, url: str, line: SerialLine, *, gathers: bool = True) -> PortListener:
-        """Open the port of a serial line, which accepts one client and hangs up on a second one."""
+        """Open and return the port of a serial line, which accepts one client and hangs up on a second one."""
         return self.network.listen(
             *_parse_address(key, url), lambda: SerialSession(line), limit=1, lag_s=SERIAL_LAG_S, gathers=gathers
         )

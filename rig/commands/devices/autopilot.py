@@ -43,12 +43,12 @@ def add(autopilot: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Carry out the chosen command of `rig autopilot`."""
+    """Carry out the chosen command of `rig autopilot`; return 0."""
     return {"store": _store, "restore": _restore}[options.of_autopilot](options)
 
 
 def _store(options: Namespace) -> int:
-    """Write a passed run's calibration into the autopilot, and keep its old parameters in a file."""
+    """Write a passed run's calibration into the autopilot, and keep its old parameters in a file; return 0."""
     from rig.data.result_file import read_passed_result
     from rig.sensors.mavlink.parameter_encoding import AutopilotParameter, encode_value
     from rig.sensors.mavlink.parameter_journal import ParameterChange
@@ -82,7 +82,7 @@ def _store(options: Namespace) -> int:
 
 
 def _restore(options: Namespace) -> int:
-    """Write the old (or with `--new` the new) parameters of a kept file into the same autopilot."""
+    """Write the old (or with `--new` the new) parameters of a kept file into the same autopilot; return 0."""
     from rig.sensors.mavlink.parameter_journal import read_change
     from rig.sensors.mavlink.writing import autopilot_id
     from rig.station.confirm import require_agreement
@@ -165,7 +165,10 @@ def _backup_path(options: Namespace) -> Path:
 
 @contextmanager
 def _connect(options: Namespace) -> Iterator[tuple["AutopilotLink", Mapping[str, "SensorSection"]]]:
-    """Connect to the configuration's only autopilot, real or simulated. Raise Refused `no_autopilot_section`."""
+    """Yield the link to the configuration's only autopilot, real or simulated, and its sensors' sections.
+
+    Raise Refused `no_autopilot_section`.
+    """
     from rig.commands.laboratory.claims import claim_sensor
     from rig.commands.laboratory.laboratory_process import run_simulated_laboratory
     from rig.commands.laboratory.own_address import load_at_own_address

@@ -66,7 +66,7 @@ def add(board: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Carry out the chosen command of `rig board`."""
+    """Carry out the chosen command of `rig board`; return its exit status."""
     if options.of_board == "flash":
         from rig.commands.devices.flash import flash
 

@@ -45,7 +45,7 @@ class BoardSlot:
 
 
 def info(options: Namespace) -> int:
-    """Print the board's identity, health, sensors and stored calibrations."""
+    """Print the board's identity, health, sensors and stored calibrations; return 0."""
     with _connect(options) as (config, board), refusing():
         calibrations = [
             board.read_calibration(sensor.index) if sensor.quantity == "rate" else None
@@ -64,7 +64,7 @@ def info(options: Namespace) -> int:
 
 
 def read(options: Namespace) -> int:
-    """Print the calibrations stored on the board, of one sensor or of all."""
+    """Print the calibrations stored on the board, of one sensor or of all; return 0."""
     with _connect(options) as (config, board):
         slots = _read_slots(board, config, options.sensor, config.sensors)
     for slot in slots:
@@ -75,7 +75,7 @@ def read(options: Namespace) -> int:
 
 
 def write(options: Namespace) -> int:
-    """Store a run's calibration on the board, of one sensor or of all that the configuration calibrates."""
+    """Store a run's calibration of one sensor, or of all that the configuration calibrates; return 0."""
     result = read_passed_result(options.result)
     with _connect(options) as (config, board):
         refuse_other_firmware(board.identity)
@@ -97,7 +97,7 @@ def write(options: Namespace) -> int:
 
 
 def erase(options: Namespace) -> int:
-    """Erase the calibrations of one sensor or of all configured ones. Raise Fault `not_erased`."""
+    """Erase the calibrations of one sensor or of all configured ones; return 0. Raise Fault `not_erased`."""
     with _connect(options) as (config, board):
         refuse_other_firmware(board.identity)
         slots = [slot for slot in _read_slots(board, config, options.sensor, config.sensors) if slot.stored is not None]

@@ -13,7 +13,7 @@ from rig.station.plain_text import say
 
 
 def flash(options: Namespace) -> int:
-    """Flash the shipped image, through the board's debug probe or by a copy to its USB drive."""
+    """Flash the shipped image, through the board's debug probe or by a copy to its USB drive; return 0."""
     with refusing():
         image = flashing.load_shipped_image()
         carry_out: Callable[[], object]

@@ -44,7 +44,7 @@ UNCHECKED_NOTE = "the board's own result: its readings are not stored, so double
 
 
 def hand(options: Namespace) -> int:
-    """Let the board calibrate, or read its last result; print the result, and this computer's check if there is one.
+    """Let the board calibrate, or read its last result; print the result and its check; return 0.
 
     Raise Refused `bad_option`, `no_such_sensor`, `not_confirmed`, `another_sensor`, `another_range`, and what
     `calibrate_by_board` and `read_kept_solution` raise; Fault as `calibrate_by_board` does.

@@ -66,7 +66,7 @@ def run(options: Namespace) -> int:
 
 
 def _query_instrument(name: str, port: str, baud: int) -> "KvhInfo":
-    """Query one instrument. Raise Refused if it does not answer at all."""
+    """Return the answers of one instrument. Raise Refused if it does not answer at all."""
     import numpy as np
 
     from rig.commands.laboratory.claims import claim_sensor

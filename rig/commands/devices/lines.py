@@ -68,7 +68,10 @@ def run(options: Namespace) -> int:
 
 
 def ask_stated(options: Namespace, *, by_hand: bool) -> "StatedProperties":
-    """Ask for values that no option states. Without a terminal, such values remain None. Raise Refused `bad_option`."""
+    """Return stated values, after asking for those that no option states; without a terminal these are None.
+
+    Raise Refused `bad_option`.
+    """
     from rig.commands.devices.terminal_questions import ask
     from rig.config.sensors.sensor_sections import check_serial_number
     from rig.sensors.lines.guessed_section import StatedProperties

@@ -66,7 +66,7 @@ def _list_sensors(result: "ResultDocument") -> list[str]:
 
 
 def _describe_scalars(run: Path) -> dict[str, str]:
-    """Describe the channels without axes, by sensor, from the recording. Raise Refused as `read_run` does."""
+    """Return the recorded channels without axes in words, by sensor. Raise Refused as `read_run` does."""
     import numpy as np
 
     from rig.data.recording.run_file import read_run

@@ -122,7 +122,10 @@ def _number(text: str) -> int:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Carry out the chosen command. Ctrl-C ends the command at once, even if the database does not answer."""
+    """Carry out the chosen command, and return its exit status.
+
+    Ctrl-C ends the command at once, even if the database does not answer.
+    """
     if options.of_history == RECOMPUTE:
         from rig.commands.history.recompute import recompute_history
 

@@ -39,7 +39,10 @@ MAX_NUMBER_DIGITS = 18  # a database's numbers have no more; serial numbers do
 
 
 def list_calibrations(options: Namespace) -> int:
-    """Print calibrations, and a serial number's trends. Raise `not_in_history` and what `open_named_history` raises."""
+    """Print calibrations, and a serial number's trends; return 0.
+
+    Raise Refused `not_in_history`, and what `open_named_history` raises.
+    """
     selection, address = _read_selection(options), _read_address(options)
     pasts = list[Past]()
     if selection.serial_number is not None or is_there(address):
@@ -65,7 +68,10 @@ def list_calibrations(options: Namespace) -> int:
 
 
 def show(options: Namespace) -> int:
-    """Print one calibration, or all in a sensor's last run, and the run's location. Raise `not_in_history`."""
+    """Print one calibration, or all in a sensor's last run, and the run's location; return 0.
+
+    Raise Refused `not_in_history`.
+    """
     with open_named_history(options) as history:
         pasts = _find_shown(history, options.calibration)
         (kept,) = history.kept(pasts[-1].run_id)
@@ -98,7 +104,10 @@ def _find_shown(history: History, named: str) -> list[Past]:
 
 
 def plot(options: Namespace) -> int:
-    """Draw the series of a serial number. Raise Refused `not_in_history`, `missing_extra`, `report_folder`."""
+    """Draw the series of a serial number; return 0.
+
+    Raise Refused `not_in_history`, `missing_extra`, `report_folder`.
+    """
     with open_named_history(options) as history:
         pasts = _select_pasts(history, _read_selection(options))
 
@@ -210,7 +219,7 @@ def compare(options: Namespace) -> int:
 
 
 def void(options: Namespace) -> int:
-    """Mark a calibration as void. Raise Refused `bad_option`, `not_in_history`, `already_voided`."""
+    """Mark a calibration as void; return 0. Raise Refused `bad_option`, `not_in_history`, `already_voided`."""
     if not options.reason.strip():
         raise Refused("bad_option", "--reason is blank", "Say in a few words why the calibration is void")
     with open_named_history(options) as history:
@@ -220,7 +229,7 @@ def void(options: Namespace) -> int:
 
 
 def open_named_history(options: Namespace) -> AbstractContextManager[History]:
-    """Open the named history.
+    """Return the named history as a context manager.
 
     Raise Refused `no_history` if there is none, because opening would make an empty one, and what `open_history`
     raises; what `load` raises if a configuration names the history.

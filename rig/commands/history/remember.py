@@ -126,7 +126,7 @@ def find_journal_end(folder: Path, history: str | None = None) -> tuple[int, str
 
 
 def describe_changes(calibrations: Sequence[CalibrationComparison]) -> tuple[str, ...]:
-    """Describe how calibrations differ from earlier ones: changed sensors first, then unchanged sensors."""
+    """Return sentences on how calibrations differ from earlier ones: on changed sensors, then on unchanged ones."""
     if not calibrations:  # with the history off its modules are not imported
         return ()
     from rig.history.terminal.change_words import change_in_short, select_changed
@@ -194,7 +194,7 @@ def _since_event(calibration: CalibrationComparison) -> LastCalibration:
 
 
 def _compare_with_earlier(history: "History", run_id: int) -> "list[CalibrationComparison]":
-    """Compare each calibration of a run with the sensor's previous one, if any."""
+    """Return the comparison of each calibration of a run with the sensor's previous one, if any."""
     from rig.history.series import changes_in, subjects
     from rig.history.store import Selection
 

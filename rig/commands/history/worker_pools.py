@@ -191,7 +191,7 @@ def _ignore_interrupts() -> None:
 
 @contextmanager
 def connect_client(address: str) -> Iterator["Client"]:
-    """Connect to the scheduler at `address` during the block. Raise Refused `missing_extra`, `no_cluster`."""
+    """Yield a client, connected to the scheduler at `address`. Raise Refused `missing_extra`, `no_cluster`."""
     from rig.errors.extras import requiring
 
     with requiring("dask"):

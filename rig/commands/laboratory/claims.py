@@ -41,7 +41,7 @@ def claim_devices(config: RigConfig) -> Iterator[None]:
 
 
 def claim_arm(host: str) -> AbstractContextManager[None]:
-    """Claim the arm or serial turner under any of its names. Raise Refused `arm_claimed`, `only_on_linux`."""
+    """Claim the arm or serial turner, under any of its names, for the block. Raise `arm_claimed`, `only_on_linux`."""
     refuse_unless_linux("what moves an arm or a servomotor")
     if "/" in host:
         return _claim("arm_claimed", f"port {_canonical_port(host)}", f"the turner at {host}")
@@ -49,17 +49,17 @@ def claim_arm(host: str) -> AbstractContextManager[None]:
 
 
 def claim_laboratory(host: str) -> AbstractContextManager[None]:
-    """Claim the address of a simulated laboratory, before its world starts. Raise Refused `arm_claimed`."""
+    """Claim a simulated laboratory's address for the block, before its world starts. Raise Refused `arm_claimed`."""
     return _claim("arm_claimed", f"laboratory {_resolve_host(host)}", f"the simulated laboratory at {host}")
 
 
 def claim_board(port: str) -> AbstractContextManager[None]:
-    """Claim the board at `port`. Raise Refused `board_claimed`."""
+    """Claim the board at `port` for the block. Raise Refused `board_claimed`."""
     return _claim("board_claimed", f"port {_canonical_port(port)}", f"the board at {port}")
 
 
 def claim_sensor(name: str, port: str) -> AbstractContextManager[None]:
-    """Claim a sensor with a port of its own. Raise Refused `sensor_claimed`."""
+    """Claim a sensor with a port of its own for the block. Raise Refused `sensor_claimed`."""
     return _claim("sensor_claimed", f"port {_canonical_port(port)}", f"the sensor {name} at {port}")
 
 
@@ -85,7 +85,7 @@ def _claim(name: str, device: str, description: str) -> Iterator[None]:
 
 
 def _describe_holder(address: str) -> str:
-    """Describe the process that holds the claim, with the command line if this process may read it."""
+    """Return the process that holds the claim, in words, with its command line if this process may read it."""
     process = 0
     try:
         with socket.socket(socket.AF_UNIX) as question:

@@ -92,7 +92,7 @@ def send_request(control: str, request: Mapping[str, Any]) -> Mapping[str, Any]:
 
 @contextmanager
 def write_temporary(config_text: str) -> Iterator[Path]:
-    """Write the configuration to a file that exists during the block."""
+    """Write the configuration to a file that exists during the block; yield its path."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "config.yaml"
         path.write_text(config_text, encoding="utf-8")

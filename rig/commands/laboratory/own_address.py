@@ -41,7 +41,7 @@ def find_own_address(config: SensorsConfig, laboratory: str | None) -> Iterator[
 
 @contextmanager
 def load_at_own_address(path: Path, overrides: Sequence[str]) -> Iterator[Loaded]:
-    """Load a configuration without its procedure, with a laboratory address of its own. Raise as `load` does."""
+    """Yield a configuration without its procedure, with a laboratory address of its own. Raise as `load` does."""
     loaded = load(path, overrides, sections=None)
     with find_own_address(loaded.config, loaded.laboratory) as moved:
         yield load(path, [*overrides, *moved], sections=None) if moved else loaded

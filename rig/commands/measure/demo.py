@@ -39,7 +39,7 @@ def run(options: Namespace) -> int:
 
 
 def _copy(folder: Path) -> int:
-    """Copy each supplied file to the folder, unless it exists there. Raise Refused `files_not_copied`."""
+    """Copy each supplied file to the folder, unless it exists there; return 0. Raise Refused `files_not_copied`."""
     import shutil
 
     copied = existing = 0

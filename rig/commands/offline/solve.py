@@ -54,7 +54,7 @@ def add(solve: ArgumentParser) -> None:
 
 
 def run(options: Namespace) -> int:
-    """Solve a recording, or samples with sweeps or attitudes, and print the result.
+    """Solve a recording, or samples with sweeps or attitudes, print the result, and return the exit status.
 
     For a recording, write nothing. Raise Refused `bad_option`, `unknown_setting`, and the errors of the solution.
     """

@@ -40,7 +40,7 @@ def run(options: Namespace) -> int:
 
 
 def _list_studies() -> int:
-    """Print each study's name, subject and duration."""
+    """Print each study's name, subject and duration; return 0."""
     from rich.console import Console
     from rich.table import Table
 
@@ -56,7 +56,7 @@ def _list_studies() -> int:
 
 
 def _run_study(options: Namespace) -> int:
-    """Run one study, print its findings and write its files into `--out`.
+    """Run one study, print its findings and write its files into `--out`; return 0.
 
     Raise Refused `unknown_study`, `bad_option`, `missing_extra`, `study_folder`, and what `refuse_links` raises.
     """

@@ -98,7 +98,7 @@ class RigBench:
         return self.configured.loaded.simulated
 
     def today(self, serial: str) -> str | None:
-        """Describe the newest calibration of today that passed; None if there is none."""
+        """Return the newest calibration of today that passed, in words; None if there is none."""
         memory = recall_sensors(self._configure(serial).loaded.config, frozenset())
         day = datetime.now(UTC).date().isoformat()
         parts = {self.configured.loaded.config.sensors[name].part for name in self._named}
@@ -122,7 +122,10 @@ class RigBench:
             make_fitter(self.control)(serial)
 
     def run(self, part: BatchPart, folder: Path, desk: Desk) -> PartEnded:
-        """Run the part in `folder`, or continue its run; repeat refused sweeps at once. Raise Refused, Fault."""
+        """Run the part in `folder`, or continue its run, repeat refused sweeps at once, and return the end.
+
+        Raise Refused and Fault as `Run.carry_out` does.
+        """
         configured = self._configure(part.serial)
         if (folder / RESULT).exists() and (ended := _read_ended(folder, configured)) is not None:
             return ended
@@ -223,7 +226,7 @@ class RigBench:
 
 @contextmanager
 def open_bench(configured: Configured, folder: Path, station: BatchSettings) -> Iterator[RigBench]:
-    """Open the bench during the block; `folder` is the batch's.
+    """Yield the bench, which is open during the block; `folder` is the batch's.
 
     Raise Refused `station_sensors` if the configuration has no sensors that a station can calibrate, and what
     `claim_devices` raises.

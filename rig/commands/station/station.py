@@ -134,7 +134,7 @@ def _send_heartbeats(config: "RigConfig", present: "Present") -> Iterator[None]:
 
 @contextmanager
 def _serve_page(wanted: "PageWish", present: "Present") -> "Iterator[Voice]":
-    """Serve the station's page, which asks the operator."""
+    """Serve the station's page during the block; yield the voice by which the page asks the operator."""
     from rig.batch.page_operator import open_page
 
     with open_page(present, wanted.address()) as (voice, url):

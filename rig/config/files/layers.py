@@ -41,12 +41,15 @@ class _Layer:
 
 
 def read_layers(path: Path, overrides: Sequence[str] = ()) -> MergedLayers:
-    """Merge a file with the files that it is based on, and the overrides. Raise `Unreadable`."""
+    """Return a file merged with the files that it is based on, and with the overrides. Raise `Unreadable`."""
     return merge_layers(read_file(path), path, overrides)
 
 
 def merge_layers(text: str, path: Path | None, overrides: Sequence[str] = ()) -> MergedLayers:
-    """Merge a text with the files that it is based on, relative to its `path`, if any. Raise `Unreadable`."""
+    """Return a text merged with overrides and with the files that it is based on, relative to its `path`, if any.
+
+    Raise `Unreadable`.
+    """
     layers = list(_layers(text, path))
     document: dict[str, Any] = {}
     places: dict[Location, str] = {}
@@ -63,7 +66,7 @@ def merge_layers(text: str, path: Path | None, overrides: Sequence[str] = ()) ->
 
 
 def merge(base: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
-    """Merge `over` into `base`: sections key by key, lists and values as a whole; null removes a key."""
+    """Return `base` changed by `over`: sections key by key, lists and values as a whole; null removes a key."""
     merged = dict(base)
     for key, value in over.items():
         below = merged.get(key)
@@ -103,7 +106,7 @@ def _layers(text: str, path: Path | None) -> Iterator[_Layer]:
 
 
 def _layer(text: str, name: str) -> _Layer:
-    """Read one file's text; only a base file has a `name`."""
+    """Return the layer in one file's text; only a base file has a `name`."""
     try:
         document = read_yaml(text)
         if not isinstance(document.data, dict):

@@ -40,7 +40,7 @@ def shut_files(identities: Callable[[], Iterable[FileIdentity]]) -> Iterator[Non
 
 @contextmanager
 def open_regular_file(path: Path, max_bytes: int, *, follow_links: bool = True) -> Iterator[BinaryIO]:
-    """Open a regular file of at most `max_bytes` for reading.
+    """Yield a regular file of at most `max_bytes`, open for reading.
 
     Raise `UnfitFile`, and OSError as `open` does. Links in another user's folder must not be followed.
     """
@@ -52,7 +52,7 @@ def open_regular_file(path: Path, max_bytes: int, *, follow_links: bool = True) 
 
 
 def read_regular_file(path: Path, max_bytes: int, *, follow_links: bool = True) -> bytes:
-    """Read the content of a regular file. Raise as `open_regular_file` does."""
+    """Return the content of a regular file. Raise as `open_regular_file` does."""
     with open_regular_file(path, max_bytes, follow_links=follow_links) as file:
         content = file.read(max_bytes + 1)
     if len(content) > max_bytes:  # it has grown meanwhile, or its size is not stated (files of /proc state 0)
@@ -73,7 +73,7 @@ def _check(status: os.stat_result, max_bytes: int) -> None:
 
 
 def _open_nonblocking(path: str, flags: int) -> int:
-    """Open a file without waiting, because a pipe may never have a writer."""
+    """Return the descriptor of a file, opened without waiting, because a pipe may never have a writer."""
     return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
 
 

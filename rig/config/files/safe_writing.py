@@ -36,7 +36,7 @@ def replace_together() -> Iterator[None]:
 
 @contextmanager
 def new_file(path: Path) -> Iterator[BinaryIO]:
-    """Open a file to be written in this block. At its end the file replaces `path`, completely or not at all.
+    """Yield a file to be written in this block. At its end the file replaces `path`, completely or not at all.
 
     Within `replace_together` this happens at the end of that block. If `path` is a link, the link is replaced, not its
     target. Raise OSError as writing does, also if another process creates a file of that name meanwhile.

@@ -61,7 +61,7 @@ def first_control_character(text: str) -> str | None:
 
 
 def read_file(path: Path) -> str:
-    """Read the text of a regular file of at most `MAX_BYTES`. Raise `Unreadable`."""
+    """Return the text of a regular file of at most `MAX_BYTES`. Raise `Unreadable`."""
     if path.suffix in OTHER_FILES and path.is_file():
         raise Unreadable(f"is {OTHER_FILES[path.suffix]}")
     try:
@@ -77,7 +77,7 @@ def read_file(path: Path) -> str:
 
 
 def read_yaml(text: str) -> Document:
-    """Parse one YAML document. Raise `Unreadable`."""
+    """Return the content of one YAML document. Raise `Unreadable`."""
     if len(text) > MAX_BYTES:
         raise Unreadable(f"is longer than {MAX_BYTES} characters, so it is not a configuration")
     for number, line in enumerate(text.split("\n"), 1):
@@ -118,7 +118,7 @@ class _Loader(yaml.SafeLoader):
         self._size_of: dict[str, int] = {}  # number of nodes that an alias stands for, once all of them are known
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
-        """Compose a node within the limits of depth and size; refuse tags and values that contain themselves."""
+        """Return the next node, within limits of depth and size; refuse tags and values that contain themselves."""
         event: Any = self.peek_event()
         if isinstance(event, yaml.AliasEvent):
             anchor = str(event.anchor)

@@ -13,7 +13,7 @@ ENCRYPTED_MODES = ("require", "verify-ca", "verify-full")
 
 
 def history_url(text: str) -> "URL":
-    """Parse a URL, resolving percent encoding. Raise ValueError with the reason if a part of the URL is not allowed."""
+    """Return the URL in a text, with percent encoding resolved. Raise ValueError if a part of it is not allowed."""
     from sqlalchemy import make_url
     from sqlalchemy.exc import ArgumentError
 

@@ -168,7 +168,7 @@ class RunRecorder:
 
 
 def read_run(path: Path, timeout_s: float | None = None, *, begun: ReadingTask | None = None) -> RunData:
-    """Read a run file: finished, still being written, or left behind by a killed process.
+    """Return the content of a run file: finished, still being written, or left behind by a killed process.
 
     `begun` is the result of `begin_reading`, if that was called before. Rows left unwritten or incomplete by a kill are
     dropped. Raise Refused: `no_run_file` without a file; `not_a_run_file` if the file is damaged, of another kind or

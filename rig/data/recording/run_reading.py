@@ -15,7 +15,7 @@ LIBRARIES_BYTES = 1 << 29  # memory: more than the libraries and the structures 
 
 
 def begin_reading(path: Path, timeout_s: float | None = None) -> ReadingTask:
-    """Begin to read a run file (`rig.data.recording.extract`), within `timeout_s` (None: by its size).
+    """Begin to read a run file, within `timeout_s` (None: by its size), and return the running task.
 
     Raise Refused `no_run_file`, and what `ReadingTask` raises.
     """

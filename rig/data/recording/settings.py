@@ -90,7 +90,7 @@ class Site:
 
 
 class Uncertainty(UncertaintyKeys[dict[str, NonNegative]]):
-    """Half-widths of errors that no recording shows; each error is equally likely to have any value within.
+    """Half-widths of errors that no recording shows; all values within a half-width are equally likely.
 
     `angle_std_deg` is the standard deviation of a joint's angle by its encoder, None if not stated. Errors of sensors
     are keyed by the sensor's name. `decision_rule` compares a limit with the value alone ("simple") or with the value

@@ -86,7 +86,7 @@ def sqlite_engine(file: Path, label: str, *, new: bool = False) -> Engine:
 
 
 def _connect_to_write(file: Path, *, new: bool) -> sqlite3.Connection:
-    """Open a file with a write-ahead log, so readers and a writer do not block each other.
+    """Return a connection with a write-ahead log, so readers and a writer do not block each other.
 
     Such a log does not work on network shares.
     """
@@ -101,7 +101,7 @@ def _connect_to_write(file: Path, *, new: bool) -> sqlite3.Connection:
 
 
 def _connect_to_read(file: Path) -> sqlite3.Connection:
-    """Open a file for reading only, in a folder in which the user cannot create files.
+    """Return a connection for reading only, to a file in a folder in which the user cannot create files.
 
     A writer would keep a log in that folder. Without a log the file does not change during reading, and needs no lock.
     """

@@ -119,7 +119,7 @@ class Certificate:
 
     @property
     def levelled(self) -> bool:
-        """Whether an accelerometer served as a level, so measured the vertical at rest, in a session by hand."""
+        """Whether an accelerometer was used as a level in a session by hand, to measure the vertical at rest."""
         sessions = (gyroscope.sensor.by_hand for gyroscope in self.gyroscopes)
         return any(
             error.name == "acceleration_m_s2" for entry in sessions if entry is not None for error in entry.errors

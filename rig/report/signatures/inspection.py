@@ -15,7 +15,7 @@ HEAD_BYTES = 200  # enough to detect the type of a file
 
 
 def inspect_file(name: str, content: bytes, trust: Trust) -> FileInspection:
-    """Inspect a file as PDF, as XML or as unsigned, whichever its content shows. Raise Refused `missing_extra`."""
+    """Return the inspection of a file as PDF, XML or unsigned, by its content. Raise Refused `missing_extra`."""
     is_pdf = content.startswith(b"%PDF-")
     if not is_pdf and not _is_xml(content):
         return FileInspection(problems=(not_signed(name),))

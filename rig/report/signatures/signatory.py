@@ -40,7 +40,7 @@ class Signatory:
 
 @contextmanager
 def signatory(where: str) -> Iterator[Signatory]:
-    """Open the key in a file, or in a token: `pkcs11:token=NAME;object=NAME?module-path=LIBRARY` (RFC 7512).
+    """Yield the key in a file, or in a token: `pkcs11:token=NAME;object=NAME?module-path=LIBRARY` (RFC 7512).
 
     Raise Refused `signing_key`, `missing_extra`.
     """
@@ -60,7 +60,7 @@ def signatory(where: str) -> Iterator[Signatory]:
 
 @contextmanager
 def _open_file(file: Path) -> Iterator[Signatory]:
-    """Open the key and certificates of a PKCS#12 or PEM file. Raise Refused `signing_key`."""
+    """Yield the key and certificates of a PKCS#12 or PEM file. Raise Refused `signing_key`."""
     from cryptography.hazmat.primitives import serialization
     from cryptography.hazmat.primitives.serialization import pkcs12
     from cryptography.x509 import load_pem_x509_certificates
@@ -109,7 +109,7 @@ def _order_chain(certificates: "Sequence[Certificate]", key: Any) -> "list[Certi
 
 @contextmanager
 def _open_token(key: TokenKey) -> Iterator[Signatory]:
-    """Open the key in a token, and its certificate, which has the same label."""
+    """Yield the key in a token, and its certificate, which has the same label."""
     with requiring(EXTRA):
         import pkcs11
         from pyhanko.config.pkcs11 import TokenCriteria

@@ -62,7 +62,7 @@ class BoardSource:
 
 @contextmanager
 def open_board_source(config: SensorsConfig, on_samples: OnSamples, *, calibrated: bool) -> Iterator[BoardSource]:
-    """Connect the board and set its sensors up for the block.
+    """Yield the connected board with its sensors set up, as a source of samples, for the block.
 
     Raise BoardError as `Board`, Refused as `require_board_section`, `refuse_other_firmware` and `set_up_sensors`.
     """

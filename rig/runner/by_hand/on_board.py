@@ -123,7 +123,7 @@ class FollowedSession:
 def calibrate_by_board(
     config: RigConfig, name: str, moves: int, scale_std: float, tell: Callable[[HandEvent], None]
 ) -> Iterator[tuple[Board, CalibratedByBoard]]:
-    """Let the board calibrate one of its sensors; the board remains connected in the block.
+    """Let the board calibrate one of its sensors; yield the board, still connected, and the calibration.
 
     The session ends after at least `moves` moves, once the standard uncertainty of the scale is at most `scale_std`.
     Raise Refused `clock_unknown`, `first_face_unknown`, and what `open_board_source` raises; Fault `board_unverified`,

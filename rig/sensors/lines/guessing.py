@@ -66,7 +66,7 @@ class Guess:
 
 
 def guess(shape: Shape, still_until_s: float) -> Guess:
-    """Guess the columns of a device that was at rest until `still_until_s` on the computer's clock, then in rotation.
+    """Return a guess at the columns of a device that rested until `still_until_s` (computer's clock), then rotated.
 
     Raise NoShape if too few lines came in either part.
     """

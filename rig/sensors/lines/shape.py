@@ -65,7 +65,7 @@ class NoShape(Exception):
 
 
 def find_shape(lines: Sequence[TimedLine]) -> Shape:
-    """Find the pattern of most lines. Raise NoShape."""
+    """Return the pattern of most lines. Raise NoShape."""
     plain = [TimedLine(line.arrived_s, _COLOURS.sub("", line.text).strip()) for line in lines]
     checked = _select_short([(line, *_split_sum(line.text)) for line in plain if line.text])
     try:

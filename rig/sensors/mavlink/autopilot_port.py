@@ -11,7 +11,7 @@ DATAGRAM_BYTES = 65536
 
 
 def open_port(port: str, baud: int) -> DevicePort:
-    """Open the port at `tcp:host:port`, `udp:host:port`, or a serial port by its name. Raise OSError."""
+    """Return the open port at `tcp:host:port`, `udp:host:port`, or a serial port by its name. Raise OSError."""
     kind, _, address = port.partition(":")
     if kind == "udp":
         host, _, number = address.rpartition(":")

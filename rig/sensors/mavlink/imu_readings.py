@@ -58,7 +58,7 @@ def is_integer(imu: str) -> bool:
 
 
 def decode_reading(message: Any) -> ImuReading:
-    """Decode a message of pymavlink. The temperature is the IMU's, in HIGHRES_IMU the barometer's."""
+    """Return the reading in a message of pymavlink, with the IMU's temperature (HIGHRES_IMU: the barometer's)."""
     kind = message.get_type()
     sent: Mapping[Field, Array] = {
         "rate": np.array([message.xgyro, message.ygyro, message.zgyro], dtype=np.float64),

@@ -88,7 +88,7 @@ def find_change(autopilot_id: str) -> ParameterChange | None:
 
 
 def read_change(path: Path) -> ParameterChange:
-    """Read the change in a file. Raise Refused `not_an_autopilot_file`."""
+    """Return the change in a file. Raise Refused `not_an_autopilot_file`."""
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
         if document["schema"] != SCHEMA:

@@ -87,7 +87,7 @@ def _request_acknowledgements(bus: Bus) -> None:
 
 
 def _report(bus: Bus, port: str, servo_id: int) -> ServoReport:
-    """Read identity, settings and several states. Raise Refused `other_servo`, ReplyLost."""
+    """Return the report of identity, settings and several states. Raise Refused `other_servo`, ReplyLost."""
     (number,) = bus.look_up(MODEL_NUMBER)
     model = model_of(number)
     if model is None:

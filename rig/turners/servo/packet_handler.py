@@ -93,11 +93,11 @@ class Bus:
         return False
 
     def read(self, register: Register) -> tuple[int, ...]:
-        """Read a register's values. Raise ReplyLost, InstructionDenied, PortGone."""
+        """Return a register's values. Raise ReplyLost, InstructionDenied, PortGone."""
         return register.unpack(self.read_bytes(register))
 
     def read_bytes(self, register: Register) -> bytes:
-        """Read a register's bytes. Raise ReplyLost, InstructionDenied, PortGone.
+        """Return a register's bytes. Raise ReplyLost, InstructionDenied, PortGone.
 
         The packet handler's `readTxRx` is not used, because it takes the requested number of bytes from a reply of any
         length, and so would take the checksum of a late acknowledgement for data.
@@ -113,7 +113,7 @@ class Bus:
         return bytes(reply[DATA : DATA + register.size])
 
     def look_up(self, register: Register) -> tuple[int, ...]:
-        """Read a register's values, repeatedly if replies are lost. Raise ReplyLost, InstructionDenied, PortGone."""
+        """Return a register's values; repeat lost requests. Raise ReplyLost, InstructionDenied, PortGone."""
         for _ in range(MAX_ATTEMPTS - 1):
             try:
                 return self.read(register)

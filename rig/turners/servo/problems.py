@@ -6,7 +6,7 @@ from rig.turners.servo.packet_handler import BusError, InstructionDenied, PortGo
 
 
 def port_lost(error: PortGone) -> Problem:
-    """Describe a port that has failed."""
+    """Return the problem of a port that has failed."""
     return Problem(
         "servo_port_lost",
         f"the servo's port has failed ({error})",
@@ -15,7 +15,7 @@ def port_lost(error: PortGone) -> Problem:
 
 
 def silent(silent_s: float, mostly_damaged: bool) -> Problem:
-    """Describe a servo that has sent no valid reply for `silent_s`."""
+    """Return the problem of a servo that has sent no valid reply for `silent_s`."""
     if mostly_damaged:
         return Problem(
             "servo_replies_damaged",
@@ -30,7 +30,7 @@ def silent(silent_s: float, mostly_damaged: bool) -> Problem:
 
 
 def servo_restarted() -> Problem:
-    """Describe a servo that has lost its supply and restarted."""
+    """Return the problem of a servo that has lost its supply and restarted."""
     return Problem(
         "servo_restarted",
         "the servo's clock started again from zero: it was switched off or restarted, and has lost its goal and turns",
@@ -39,7 +39,7 @@ def servo_restarted() -> Problem:
 
 
 def torque_lost() -> Problem:
-    """Describe torque that another program has switched off."""
+    """Return the problem of torque that another program has switched off."""
     return Problem(
         "servo_torque_lost",
         "the servo's torque is off, and the rig did not switch it off",
@@ -48,7 +48,7 @@ def torque_lost() -> Problem:
 
 
 def watchdog_tripped() -> Problem:
-    """Describe a servo stopped by its own watchdog."""
+    """Return the problem of a servo stopped by its own watchdog."""
     return Problem(
         "servo_watchdog_tripped",
         "the servo's watchdog has stopped it: no instruction came in time",
@@ -57,12 +57,12 @@ def watchdog_tripped() -> Problem:
 
 
 def driver_died(error: Exception) -> Problem:
-    """Describe a link's thread that has failed."""
+    """Return the problem of a link's thread that has failed."""
     return Problem("servo_driver_died", f"the servo's driver has failed ({error!r})", "Report it, with the log")
 
 
 def driver_hung(silent_s: float) -> Problem:
-    """Describe a link whose thread hangs."""
+    """Return the problem of a link whose thread hangs."""
     return Problem(
         "servo_driver_hung",
         f"the thread that drives the servo's line has not run for {silent_s:.1f} s",
@@ -71,12 +71,12 @@ def driver_hung(silent_s: float) -> Problem:
 
 
 def state_not_taken(error: Exception) -> Problem:
-    """Describe a state that could not be recorded."""
+    """Return the problem of a state that could not be recorded."""
     return Problem("servo_state_not_taken", f"a state could not be passed on ({error})", "See the log")
 
 
 def move_unsupervised(for_s: float, doing: str) -> Problem:
-    """Describe a move that was unsupervised for `for_s`."""
+    """Return the problem of a move that was unsupervised for `for_s`."""
     return Problem(
         "servo_unwatched",
         f"nobody has supervised the servo for {for_s:.0f} s during {doing}",
@@ -85,7 +85,7 @@ def move_unsupervised(for_s: float, doing: str) -> Problem:
 
 
 def slower_than_planned(motion: Motion, within_s: float) -> Problem:
-    """Describe a move that has not ended in time."""
+    """Return the problem of a move that has not ended in time."""
     return Problem(
         "servo_slower_than_planned",
         f"{motion.name} did not end within {within_s:.1f} s, planned were {motion.duration_s:.1f} s",
@@ -94,7 +94,7 @@ def slower_than_planned(motion: Motion, within_s: float) -> Problem:
 
 
 def does_not_hear(error: BusError) -> Problem:
-    """Describe an instruction without an acknowledgement."""
+    """Return the problem of an instruction without an acknowledgement."""
     return Problem(
         "servo_does_not_hear",
         f"the servo did not acknowledge an instruction ({error})",
@@ -103,7 +103,7 @@ def does_not_hear(error: BusError) -> Problem:
 
 
 def refuses(error: InstructionDenied) -> Problem:
-    """Describe an instruction that the servo refuses."""
+    """Return the problem of an instruction that the servo refuses."""
     return Problem(
         "servo_refuses",
         f"the servo refuses an instruction: {error}",

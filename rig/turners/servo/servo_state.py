@@ -65,7 +65,7 @@ _IN_ORDER: Callable[[ServoState], Row] = attrgetter(*(field.name for field in fi
 def decode(
     data: bytes, model: ServoModel, transaction_s: tuple[float, float], host_time_s: float, hardware_error: int
 ) -> ServoState:
-    """Decode the state in a reply's 27 bytes; `transaction_s` are the times before the request and after the reply."""
+    """Return the state in a reply's 27 bytes; `transaction_s` has the times before the request and after the reply."""
     began_s, ended_s = transaction_s
     tick, moving, status, _, load, velocity, position, _, _, voltage, temperature = STATE.unpack(data)
     return ServoState(

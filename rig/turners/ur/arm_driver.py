@@ -429,6 +429,6 @@ def _not_started(motion: Motion) -> Problem:
 
 
 def look(host: str, robot_api_port: int = ROBOT_API_PORT) -> ArmReport:
-    """Read the arm's report; nothing moves and no program is stopped. Raise as `Arm.start` and `read_report` do."""
+    """Return the arm's report; nothing moves and no program is stopped. Raise as `Arm.start` and `read_report` do."""
     with Arm(host, robot_api_port=robot_api_port) as arm:
         return arm.report()

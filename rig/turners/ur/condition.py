@@ -87,7 +87,7 @@ def readiness(state: ArmState) -> Problem | None:
 
 
 def local_control_during_run(what: str) -> Problem:
-    """Describe a pendant that was switched to local control during a run; `what` states how that showed."""
+    """Return the problem of a pendant that was switched to local control in a run; `what` states how that showed."""
     return Problem(
         "switched_to_local_control",
         what,
@@ -97,7 +97,7 @@ def local_control_during_run(what: str) -> Problem:
 
 
 def local_control(host: str) -> Problem:
-    """Describe a pendant in local control."""
+    """Return the problem of a pendant in local control."""
     return Problem(
         "not_in_remote_control",
         f"the arm at {host} is in local control",
@@ -106,7 +106,7 @@ def local_control(host: str) -> Problem:
 
 
 def speed_limited(state: ArmState) -> Problem:
-    """Describe an arm slowed by a limit of the safety settings, with the slider at 100 %."""
+    """Return the problem of an arm slowed by a limit of the safety settings, with the slider at 100 %."""
     return Problem(
         "speed_limited",
         f"the controller runs its program at {100 * state.speed_scaling:.0f} % of the programmed speed, with the speed "
@@ -116,7 +116,7 @@ def speed_limited(state: ArmState) -> Problem:
 
 
 def payload_refused(carried: FlangeLoad) -> Problem:
-    """Describe a program that the controller has ended because of its payload."""
+    """Return the problem of a program that the controller has ended because of its payload."""
     return Problem(
         "payload_not_set",
         f"the controller does not take a payload of {carried.payload_kg:g} kg",

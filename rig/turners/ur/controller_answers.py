@@ -36,7 +36,7 @@ def stop_problem(host: str, version: tuple[int, ...]) -> Problem | None:
 
 
 def no_states(host: str, error: OSError) -> Problem:
-    """Describe a host that sends no states, because no arm answers or because only the arm's other ports answer."""
+    """Return the problem of a host that sends no states, because no arm or only the arm's other ports answer."""
     for interface in (Dashboard, PrimaryStop):
         try:
             interface(host, CLOSED_PORT_TIMEOUT_S).close()
@@ -130,7 +130,7 @@ def _has_free_registers(host: str, version: tuple[int, ...]) -> bool | None:
 
 
 def _describe_closed_port(interface: type[Dashboard] | type[PrimaryStop], host: str, error: OSError) -> Problem:
-    """Describe a closed port that the rig needs to stop an arm."""
+    """Return the problem of a closed port that the rig needs to stop an arm."""
     if interface is Dashboard:
         return Problem(
             "no_dashboard",

@@ -15,7 +15,7 @@ FIELDBUS = (
 
 
 def describe_early_end(problem: Problem) -> Problem:
-    """Describe a problem of the preparation: the program was started and ended at once."""
+    """Return the problem that the control program was stopped right after its start, as `problem` shows."""
     what = f"the control program on the arm was stopped right after its start ({problem.what})"
     return Problem("program_stopped", what, FIELDBUS)
 

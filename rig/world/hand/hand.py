@@ -158,7 +158,7 @@ class SimulatedHand:
         return np.asarray(align_vectors(attitude @ self._normals[face], lying[:, 2]) @ attitude, dtype=np.float64)
 
     def _draw_horizontal(self) -> Array:
-        """Draw a horizontal unit vector, (3,)."""
+        """Return a horizontal unit vector, (3,), drawn at random."""
         angle = self._rng.uniform(0, 2 * np.pi)
         return np.array([np.cos(angle), np.sin(angle), 0.0])
 

@@ -155,7 +155,7 @@ class Printer:
 
 
 def _format_value(value: float, section: LineRateSection | LineAccelerationSection | LineFieldSection | None) -> str:
-    """Format a reading in SI units as the device's program writes it."""
+    """Return a reading in SI units as the device's program prints it."""
     if section is None:  # printed in SI units; the rig does not read it
         return f"{value:.{DEFAULT_DECIMALS}f}"
     decimals = DEFAULT_DECIMALS if section.decimals is None else section.decimals

@@ -41,7 +41,7 @@ class ProfileStart(NamedTuple):
 
 
 def plan_timed(start: ProfileStart, goal_rad: float, total_s: float, ramp_s: float, limit_rad_s: float) -> Profile:
-    """Plan a move of `total_s` with ramps of `ramp_s`; a move that would exceed `limit_rad_s` takes longer."""
+    """Return a move of `total_s` with ramps of `ramp_s`; a move that would exceed `limit_rad_s` takes longer."""
     distance_rad = goal_rad - start.angle_rad
     ramp_s = min(ramp_s, total_s / 2)
     cruise_rad_s = (distance_rad - start.rate_rad_s * ramp_s / 2) / (total_s - ramp_s)
@@ -52,7 +52,7 @@ def plan_timed(start: ProfileStart, goal_rad: float, total_s: float, ramp_s: flo
 
 
 def plan_limited(start: ProfileStart, goal_rad: float, speed_rad_s: float, acceleration_rad_s2: float) -> Profile:
-    """Plan a move of at most `speed_rad_s`, with ramps of `acceleration_rad_s2`."""
+    """Return a move of at most `speed_rad_s`, with ramps of `acceleration_rad_s2`."""
     v0, a = start.rate_rad_s, acceleration_rad_s2
     distance_rad = goal_rad - start.angle_rad
     sign = copysign(1.0, distance_rad - v0 * abs(v0) / (2 * a))  # sign of the distance from its stopping point

@@ -11,7 +11,7 @@ LINK_REMEDY = "Look at the arm and its network cable, then start again"
 
 
 def control_failure(host: str, version: tuple[int, ...], reason: str) -> Problem:
-    """Describe why the client's constructor failed, according to its message."""
+    """Return the problem that explains why the client's constructor failed, according to its message."""
     if "remote control" in reason:
         return local_control(host)
     if "already in use" in reason:  # the register was taken after the check
@@ -24,12 +24,12 @@ def control_failure(host: str, version: tuple[int, ...], reason: str) -> Problem
 
 
 def move_failure(what: str) -> Problem:
-    """Describe a move that was not begun."""
+    """Return the problem of a move that was not begun."""
     return Problem("move_refused", what, "Read the pendant's log and check the configured speed and acceleration")
 
 
 def payload_failure(reported_kg: float, wanted_kg: float) -> Problem:
-    """Describe a payload that the arm's states do not show, for an unknown reason."""
+    """Return the problem of a payload that the arm's states do not show, for an unknown reason."""
     return Problem(
         "payload_not_set",
         f"the controller uses a payload of {reported_kg:g} kg instead of {wanted_kg:g} kg",
@@ -38,12 +38,12 @@ def payload_failure(reported_kg: float, wanted_kg: float) -> Problem:
 
 
 def link_lost(what: str) -> Problem:
-    """Describe a connection that delivers no more states."""
+    """Return the problem of a connection that delivers no more states."""
     return Problem("arm_link_lost", what, LINK_REMEDY)
 
 
 def payload_changed(ours: StatePacket, theirs: StatePacket) -> Problem:
-    """Describe a payload that another program has set after this one."""
+    """Return the problem of a payload that another program has set after this one."""
 
     def show(packet: StatePacket) -> str:
         centre = ", ".join(f"{1e3 * coordinate_m:.0f}" for coordinate_m in packet.payload_centre_m)
@@ -57,7 +57,7 @@ def payload_changed(ours: StatePacket, theirs: StatePacket) -> Problem:
 
 
 def connection_failure(host: str, error: OSError) -> Problem:
-    """Describe why no states come from the controller at `host`."""
+    """Return the problem that explains why no states come from the controller at `host`."""
     if isinstance(error, ImpossibleState):
         return error.problem
     if isinstance(error, NotSupported):

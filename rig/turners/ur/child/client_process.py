@@ -230,7 +230,7 @@ class _Child:
         return self._await_payload(request.carried.payload_kg)
 
     def _await_payload(self, wanted_kg: float) -> Message:
-        """Wait until the states show the payload; the parent judges everything else in the states.
+        """Wait until the states show the payload, and return the answer; the parent judges all else in the states.
 
         Older states may still be unread, because the client's constructor blocked the interpreter or this process got
         no processor. So the payload counts as refused only if the first state on a new connection does not show it.

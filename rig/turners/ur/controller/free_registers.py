@@ -49,7 +49,7 @@ def register_names(first: int) -> list[str]:
 
 
 def registers_in_use(host: str, version: tuple[int, ...]) -> Problem:
-    """Describe an arm at `host` that cannot be driven by RTDE, because its registers are in use."""
+    """Return the problem of an arm at `host` that cannot be driven by RTDE, because its registers are in use."""
     which = (
         "of both halves, 0-23 and 24-47,"
         if UPPER_FIRST in usable_halves(version)

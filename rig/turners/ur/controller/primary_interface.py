@@ -55,7 +55,7 @@ class ArmDescription:
 
 
 def read_description(host: str, timeout_s: float) -> ArmDescription:
-    """Read the description from the controller at `host` within `timeout_s`. Raise `OSError`."""
+    """Return the description that the controller at `host` sends within `timeout_s`. Raise `OSError`."""
     deadline_s, buffer, description = time.monotonic() + timeout_s, bytearray(), ArmDescription()
     with socket.create_connection((host, PORT), timeout_s) as connection:
         while not description.complete and (remaining_s := deadline_s - time.monotonic()) > 0:

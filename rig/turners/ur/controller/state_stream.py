@@ -156,7 +156,7 @@ class StateStream:
         return packets
 
     def _check(self, packet: StatePacket) -> Problem | None:
-        """Return a problem if the controller's clock was set since the last state. Raise `ImpossibleState`."""
+        """Return a problem if the controller's clock was set since the last state. Raise `ImpossibleState` for such."""
         before, after = self._last, packet.state
         impossible = impossible_state(after) or impossible_payload(packet.payload_kg, packet.payload_centre_m)
         step = None
@@ -232,7 +232,7 @@ class StateStream:
 
 
 def _decode_packet(payload: bytes) -> StatePacket:
-    """Decode a packet. Raise `ConnectionError` for another number of bytes: some were lost in transfer."""
+    """Return a packet's content. Raise `ConnectionError` for a wrong number of bytes, of which some were lost."""
     if len(payload) != PACKET.size:
         raise ConnectionError(f"a state of {len(payload)} bytes instead of {PACKET.size}")
     values = PACKET.unpack(payload)

@@ -197,7 +197,7 @@ class DashboardSession:
         return "Brake releasing"
 
     def _unlock(self) -> str:
-        """Unlock a protective stop, at the earliest after 5 s: a rule of the pendant and the dashboard only."""
+        """Unlock a protective stop that has lasted 5 s (only pendant and dashboard require this); return the answer."""
         if self._robot.safety_mode == SafetyMode.PROTECTIVE_STOP and self._robot.stopped_for_s < UNLOCK_AFTER_S:
             return UNLOCK_REFUSAL
         self._robot.unlock_protective_stop()

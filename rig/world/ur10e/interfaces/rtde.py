@@ -92,7 +92,7 @@ class RtdeSession:
         return b""
 
     def receive(self, data: bytes) -> bytes:
-        """Answer every complete package and keep the remaining bytes; close the connection at an impossible size."""
+        """Return the answers to all complete packages, and keep further bytes; close the connection at a wrong size."""
         self._buffer += data
         answer = b""
         while len(self._buffer) >= HEADER.size:
@@ -137,7 +137,7 @@ class RtdeSession:
         return build_package("v", struct.pack(">4I", *self._robot.identity.polyscope))
 
     def _setup_outputs(self, payload: bytes) -> bytes:
-        """Set up the output recipe of a request; answer with the types of its variables."""
+        """Set up the output recipe of a request; return the answer, which has the types of its variables."""
         frequency_hz = DEFAULT_HZ
         if self._version == 2:
             (frequency_hz,) = struct.unpack_from(">d", payload)
@@ -155,7 +155,7 @@ class RtdeSession:
         return build_package("O", lead + ",".join(kinds).encode())
 
     def _setup_inputs(self, payload: bytes) -> bytes:
-        """Set up an input recipe and claim its registers; answer with the types, or with the reason for a refusal."""
+        """Set up an input recipe and claim its registers; return the answer: the types, or the reason for a refusal."""
         if len(self._inputs) == INPUT_RECIPES:
             return self._say("no more input recipes") + build_package("I", b"\0")
         names = _names(payload)
@@ -188,7 +188,7 @@ class RtdeSession:
         return build_package("P", b"\1")
 
     def _data(self, payload: bytes) -> bytes:
-        """Write a data package's values into the inputs of its recipe."""
+        """Write a data package's values into the inputs of its recipe; return b"", or a message on an error."""
         recipe = self._inputs.get(payload[0]) if payload else None
         if recipe is None:
             return self._say("data package for an input recipe that was never set up")
@@ -205,7 +205,7 @@ class RtdeSession:
         return b""
 
     def _message(self, payload: bytes) -> bytes:
-        """Log a text message from a client, without an answer."""
+        """Log a text message from a client; return b"", because it is not answered."""
         length = payload[0] if payload else 0
         self._robot.messages.say(payload[1 : 1 + length].decode(errors="replace"))
         return b""

@@ -84,7 +84,7 @@ def approach_speed(tool_speed: Sequence[float], target: Sequence[float], step: f
 def plan_straight_line(
     start: Joints, pose: Sequence[float], speed_m_s: float, acceleration_m_s2: float, links: Links = NOMINAL
 ) -> Generator[None, None, Trajectory]:
-    """Plan a moveL from rest to rest, a few knots per tick so that the world continues during planning.
+    """Return a moveL from rest to rest, after planning a few knots per tick, so that the world continues meanwhile.
 
     If a joint would be too fast, the whole line is slowed down. Raise `OutOfReach` if the pose is out of reach, or if
     the line would be slowed down below the fraction `MIN_SPEED_FRACTION` of its speed, as near a singularity.
@@ -112,7 +112,7 @@ def plan_straight_line(
 def _sample_line(
     start: Joints, twist: Array, top_m_s: float, acceleration: float, links: Links
 ) -> Generator[None, None, tuple[list[MotionSegment], float]]:
-    """Sample a line at the speed `top_m_s`, some knots per tick; return its segments and the largest speed ratio.
+    """Sample a straight line at `top_m_s`, some knots per tick; return its segments and the largest speed ratio.
 
     The speed ratio of a joint is its speed divided by its limit.
     """

@@ -71,7 +71,7 @@ def rotate_pose(pose: Sequence[float], turn: Rotation) -> tuple[float, ...]:
 
 
 def compose_poses(frame: Sequence[float], pose: Sequence[float]) -> tuple[float, ...]:
-    """Convert a `pose` given in `frame` to the base frame, as `pose_trans` of URScript does."""
+    """Return a `pose` given in `frame` in the base frame, as `pose_trans` of URScript does."""
     rotation = rotation_from_vector(frame[3:])
     position = (
         origin + sum(turn * coordinate for turn, coordinate in zip(row, pose[:3], strict=True))

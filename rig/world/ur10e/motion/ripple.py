@@ -54,7 +54,7 @@ class Ripple:
 
 
 def draw_ripple(fraction: float, cycles_per_turn: Sequence[int], random: Random) -> Ripple:
-    """Draw a ripple with components of equal rate. Its RMS rate over a turn is `fraction` of the joint's rate."""
+    """Return a random ripple with components of equal rate. Its RMS rate is `fraction` of the joint's rate."""
     if fraction == 0.0:
         return Ripple()
     rate = fraction * sqrt(2.0 / len(cycles_per_turn))

@@ -71,9 +71,10 @@ def build_rest(q_rad: Joints) -> Trajectory:
 def plan_joint_move(
     start_rad: Joints, end_rad: Joints, speed_rad_s: float, acceleration_rad_s2: float, limits_rad_s: Joints
 ) -> Trajectory:
-    """Plan a moveJ from rest to rest: all joints in step, the one with the longest path at `speed_rad_s` after a ramp.
+    """Return a moveJ from rest to rest, in which all joints are in step, the fastest at `speed_rad_s` after a ramp.
 
-    A path too short to reach the speed has no constant part. If a joint would exceed its limit, all slow down together.
+    A path too short to reach the speed has no constant part. If a joint would exceed its limit, all joints slow down
+    together.
     """
     path = tuple(b - a for a, b in zip(start_rad, end_rad, strict=True))
     longest = max(abs(w) for w in path)
@@ -104,7 +105,7 @@ def plan_joint_move(
 def plan_soft_joint_move(
     start_rad: Joints, end_rad: Joints, speed_rad_s: float, acceleration_rad_s2: float, limits_rad_s: Joints
 ) -> Trajectory:
-    """Plan a moveJ that a controller plays as a program of its own: it starts gently, and stops like any other.
+    """Return a moveJ that a controller plays as a program of its own: the move starts gently, and stops as usual.
 
     In logs of a UR3 and of the maker's simulator the acceleration grows with the square of time in 19 steps of 8 ms, to
     1.38 times the requested acceleration; then it has the requested value. A move that is too slow or too short for
@@ -142,7 +143,7 @@ def plan_soft_joint_move(
 
 
 def plan_speed_change(q_rad: Joints, from_rad_s: Joints, to_rad_s: Joints, acceleration_rad_s2: float) -> Trajectory:
-    """Plan a change of velocity, in which the joint whose speed changes most has the given acceleration.
+    """Return a change of velocity, in which the joint whose speed changes most has the given acceleration.
 
     Afterwards the joints keep the new velocity, or rest if the new velocity is zero.
     """
