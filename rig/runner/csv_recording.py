@@ -31,7 +31,7 @@ POLL_S = 0.05
 
 @contextmanager
 def connect_sensors(config: SensorsConfig, on_samples: OnSamples) -> Iterator[tuple[SampleSource, ...]]:
-    """Set up every sensor of a configuration and provide the sources. Raise Refused if a device differs."""
+    """Set up every sensor of a configuration and yield the sources. Raise Refused if a device differs."""
     with ExitStack() as stack:
         sources: list[SampleSource] = []
         with refusing():

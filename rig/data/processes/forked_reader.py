@@ -63,7 +63,7 @@ class ForkedReader:
         self._ended = os.pidfd_open(self.pid)
 
     def communicate(self, timeout: float) -> tuple[None, bytes]:
-        """Return the process' output on stderr, once it has ended. Raise subprocess.TimeoutExpired."""
+        """Return None and the process' stderr, as `Popen` does, once it has ended. Raise subprocess.TimeoutExpired."""
         self.wait(timeout)
         self.stderr.seek(0)
         return None, self.stderr.read()

@@ -138,7 +138,10 @@ def _sha256(connection: Connection, table: Table, key: tuple[int | str, ...]) ->
 
 
 def _rows(connection: Connection, table: Table, key: tuple[int | str, ...]) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield the row, and for a run its parts, without nulls, so that a column added later changes no hash."""
+    """Yield the table's name and the values of the row with this `key`, and for a run those of its parts.
+
+    Null values are left out, so that a column added later changes no hash.
+    """
     condition = [column == value for column, value in zip(table.primary_key, key, strict=True)]
     questions = [(table.name, select(table).where(*condition))]
     if table is schema.run:

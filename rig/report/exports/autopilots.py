@@ -150,7 +150,7 @@ ARDUPILOT: Autopilot = {
 
 
 def sensor_parameters(autopilot: Autopilot, index: int, sensor: SensorCorrection) -> Iterator[tuple[str, float]]:
-    """Yield the parameters for the sensor number `index`, from 0; nothing if the autopilot has none for it."""
+    """Yield name and value of each parameter for the sensor number `index`, from 0; nothing if there are none."""
     numbers = {"index": index, "number": index + 1, "later": index + 1 if index else ""}
     for name, values_of in autopilot.get(sensor.quantity, {}).items():
         for axis, value in zip(AXES, values_of(sensor), strict=False):

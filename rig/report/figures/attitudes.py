@@ -115,6 +115,6 @@ def _draw_sphere(axes: "Axes", sensor_plot: AttitudePlot) -> None:
 
 
 def _lambert(unit: Array) -> tuple[Array, Array]:
-    """Return Lambert's projection of unit vectors (n, 3) of the half z ≥ 0 into the unit circle."""
+    """Return x and y (n,) of Lambert's projection of unit vectors (n, 3) with z ≥ 0 into the unit circle."""
     size = np.sqrt(1 / (1 + np.clip(unit[:, 2], 0, 1)))
     return unit[:, 0] * size, unit[:, 1] * size

@@ -83,7 +83,7 @@ def draw_errors(figure: "Figure", time_s: Array, flange_rate: Array, error: Arra
 
 
 def _curve(time_s: Array, values: Array) -> tuple[Array, Array]:
-    """Return the points of a curve, interrupted at gaps of the arm's states."""
+    """Return times and values of a curve, interrupted by NaN at gaps of the arm's states."""
     times, values = envelope(time_s, values)
     gaps = np.flatnonzero(np.diff(times) > GAP_S) + 1
     return np.insert(times, gaps, np.nan), np.insert(values, gaps, np.nan)

@@ -135,7 +135,7 @@ def _lists(reader: PdfFileReader) -> list[CertificateList]:
 
 
 def _attachments(reader: PdfFileReader) -> Iterator[tuple[str, bytes]]:
-    """Yield the files attached to the document."""
+    """Yield name and content of each file attached to the document."""
     try:
         names = reader.root["/Names"]["/EmbeddedFiles"]["/Names"]
     except KeyError:

@@ -90,7 +90,7 @@ def rows_of(
 
 
 def degrees_of(sensor: GyroscopeEntry) -> tuple[str, float]:
-    """Return the unit of biases printed in addition to rad/s, and its factor: °/h if U is small."""
+    """Return the second unit of printed biases, °/h if U is small and °/s otherwise, and its factor from rad/s."""
     return ("°/s", DEG) if DEG * max(_widths(sensor)[3:]) >= MAX_FINE_DEG_S else ("°/h", 3600 * DEG)
 
 

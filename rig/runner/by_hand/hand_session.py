@@ -299,7 +299,7 @@ class HandSession:
 
 
 def drain(heard: "SimpleQueue[tuple[str, NDArray[Any]]]") -> Iterator[tuple[str, NDArray[Any]]]:
-    """Yield the samples that have arrived, without waiting for more."""
+    """Yield the samples that have arrived, with their sensor's name, without waiting for more."""
     while not heard.empty():
         yield heard.get()
 

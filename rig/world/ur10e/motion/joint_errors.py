@@ -123,7 +123,7 @@ class JointErrors:
     def _encoder_to_true(
         self, q_rad: Joints, qd_rad_s: Joints, qdd_rad_s2: Joints
     ) -> tuple[list[float], list[float], list[float]]:
-        """Return the true joints without vibration and settling."""
+        """Return the joints' true angles, speeds and accelerations, without vibration and settling."""
         angles, speeds, accelerations = list(q_rad), list(qd_rad_s), list(qdd_rad_s2)
         for joint, (e, speed) in enumerate(zip(q_rad, qd_rad_s, strict=True)):
             if self._last[joint][0] != e or not self._is_current[joint]:  # most moves use few joints
