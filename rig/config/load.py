@@ -251,10 +251,7 @@ def _validate_procedure(
 def _validate_turner(
     document: Mapping[str, Any], turners: Turners, layered: MergedLayers
 ) -> tuple[TurnerSection | None, list[str]]:
-    """Return the turner's section (`arm`, or `turner` with its kind), None if invalid, and the problems.
-
-    A wrong kind is a single problem.
-    """
+    """Return the turner's section, None if invalid, and the problems; a wrong kind is a single problem."""
     if "turner" not in document:
         if "arm" not in document:
             return None, ["arm: missing"]

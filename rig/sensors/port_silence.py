@@ -23,9 +23,10 @@ PATIENCE = Patience()
 
 
 class PortSilence:
-    """The time, s, in which a port was read without data; so a delayed reader does not make a device seem silent.
+    """The silence of a port: the time, s, for which it was read without data.
 
-    Time in which another instrument's clock stops, as in a simulation, does not count either.
+    A delayed reader therefore does not make a device seem silent. Time in which another instrument's clock stops, as in
+    a simulation, does not count either.
     """
 
     def __init__(self) -> None:

@@ -165,10 +165,7 @@ def _backup_path(options: Namespace) -> Path:
 
 @contextmanager
 def _connect(options: Namespace) -> Iterator[tuple["AutopilotLink", Mapping[str, "SensorSection"]]]:
-    """Yield the link to the configuration's only autopilot, real or simulated, and its sensors' sections.
-
-    Raise Refused `no_autopilot_section`.
-    """
+    """Yield the link to the configuration's only autopilot, and its sensors. Raise Refused `no_autopilot_section`."""
     from rig.commands.laboratory.claims import claim_sensor
     from rig.commands.laboratory.laboratory_process import run_simulated_laboratory
     from rig.commands.laboratory.own_address import load_at_own_address

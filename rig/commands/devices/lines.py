@@ -68,10 +68,7 @@ def run(options: Namespace) -> int:
 
 
 def ask_stated(options: Namespace, *, by_hand: bool) -> "StatedProperties":
-    """Return stated values, after asking for those that no option states; without a terminal these are None.
-
-    Raise Refused `bad_option`.
-    """
+    """Return the stated values, asked for at a terminal if no option states them. Raise Refused `bad_option`."""
     from rig.commands.devices.terminal_questions import ask
     from rig.config.sensors.sensor_sections import check_serial_number
     from rig.sensors.lines.guessed_section import StatedProperties

@@ -122,10 +122,7 @@ def _number(text: str) -> int:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Carry out the chosen command, and return its exit status.
-
-    Ctrl-C ends the command at once, even if the database does not answer.
-    """
+    """Carry out the chosen command; return its exit status. Ctrl-C ends it even if the database hangs."""
     if options.of_history == RECOMPUTE:
         from rig.commands.history.recompute import recompute_history
 

@@ -68,10 +68,7 @@ def list_calibrations(options: Namespace) -> int:
 
 
 def show(options: Namespace) -> int:
-    """Print one calibration, or all in a sensor's last run, and the run's location; return 0.
-
-    Raise Refused `not_in_history`.
-    """
+    """Print one calibration, or all of a sensor's last run, and the run's place; return 0. Raise `not_in_history`."""
     with open_named_history(options) as history:
         pasts = _find_shown(history, options.calibration)
         (kept,) = history.kept(pasts[-1].run_id)
@@ -104,10 +101,7 @@ def _find_shown(history: History, named: str) -> list[Past]:
 
 
 def plot(options: Namespace) -> int:
-    """Draw the series of a serial number; return 0.
-
-    Raise Refused `not_in_history`, `missing_extra`, `report_folder`.
-    """
+    """Draw a serial number's series; return 0. Raise Refused `not_in_history`, `missing_extra`, `report_folder`."""
     with open_named_history(options) as history:
         pasts = _select_pasts(history, _read_selection(options))
 

@@ -86,10 +86,7 @@ def sqlite_engine(file: Path, label: str, *, new: bool = False) -> Engine:
 
 
 def _connect_to_write(file: Path, *, new: bool) -> sqlite3.Connection:
-    """Return a connection with a write-ahead log, so readers and a writer do not block each other.
-
-    Such a log does not work on network shares.
-    """
+    """Return a connection whose write-ahead log serves readers and a writer at once, but not on network shares."""
     connection = _connect(file, "mode=rwc" if new else "mode=rw")
     if not new:
         refuse_unmarked(connection, file)

@@ -16,9 +16,7 @@ from rig.report.exports.exported_corrections import ExportedCalibrations, Imu
 
 
 def kalibr_files(calibrations: ExportedCalibrations) -> Mapping[str, str]:
-    """Return the texts of `…_imu.yaml` (noise) and `…_intrinsics.yaml` for each IMU, by file name.
-
-    Raise Refused `nothing_to_export`."""
+    """Return `…_imu.yaml` (noise) and `…_intrinsics.yaml` of each IMU, by name. Raise Refused `nothing_to_export`."""
     files = {}
     names = plain_names(imu.name for imu in calibrations.imus)
     for imu in calibrations.imus:

@@ -57,10 +57,7 @@ def document(sensors: Mapping[str, SensorAtRest]) -> dict[str, Any]:
 
 
 def draw_at_rest(sensors: Mapping[str, SensorAtRest], folder: Path) -> list[Path]:
-    """Draw `allan_<sensor>` as PNG and SVG into `folder`, for each sensor with a curve, and return the paths.
-
-    This needs matplotlib.
-    """
+    """Draw `allan_<sensor>` by matplotlib, as PNG and SVG, for each sensor with a curve; return the paths."""
     from matplotlib.figure import Figure
 
     written = list[Path]()

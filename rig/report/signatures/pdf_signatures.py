@@ -51,10 +51,7 @@ def inspect_pdf(name: str, content: bytes, trust: Trust) -> FileInspection:
 
 
 def _status(signature: Any, trust: Trust) -> Any:
-    """Return pyHanko's status of a signature, with trust in the time servers of `trust` but in no signer.
-
-    `why_untrusted` judges the signer.
-    """
+    """Return pyHanko's status of a signature: time servers of `trust` are trusted, and the signer is not judged."""
     no_signers = ValidationContext(trust_roots=[], allow_fetching=False)
     roots = list(map(Certificate.load, trust.certificates))
     servers = ValidationContext(trust_roots=roots, allow_fetching=False)

@@ -39,10 +39,7 @@ class DryRun:
 
     @cached_property
     def account(self) -> "AttitudeAccount | None":
-        """The accuracy of accelerometers to expect from the plan's attitudes; None if none is calibrated.
-
-        Raise the errors of `attitude_account`.
-        """
+        """The accuracy to expect of accelerometers, None if none is calibrated. Raise as `attitude_account` does."""
         if self.config.procedure.accelerometer_order == 0:
             return None
         from rig.analysis.design.attitude_information import attitude_account

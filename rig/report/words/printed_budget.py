@@ -56,10 +56,7 @@ class PrintedBudget:
 
 
 def lay_out_budget(budget: BudgetEntry, scale: Sequence[float], bias: DisplayUnit) -> PrintedBudget:
-    """Return the printed budget, in order of decreasing contributions, with the bias in unit `bias`.
-
-    Negligible contributors share the last line.
-    """
+    """Return the printed budget, largest contributions first, negligible ones in one line, biases in unit `bias`."""
     indices = find_printed_indices(budget, scale)
     sizes = [
         _Size.choose(budget.std[indices[0]], 1.0, ""),

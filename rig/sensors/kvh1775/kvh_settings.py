@@ -66,10 +66,7 @@ def corrections(stored: Mapping[str, str], required: Kvh1775Settings) -> dict[st
 
 
 def refusals(sensor: str, stored: Mapping[str, str]) -> Iterable[SensorError]:
-    """Yield SensorErrors for stored settings that only the owner may change.
-
-    They are `kvh_axes_not_identity` and `kvh_custom_filter`.
-    """
+    """Yield `kvh_axes_not_identity` and `kvh_custom_filter` for stored settings that only the owner may change."""
     if not same(stored["AXES"], ",".join(str(value) for value in np.eye(3).ravel())):
         yield SensorError(
             "kvh_axes_not_identity",

@@ -30,10 +30,7 @@ class JobCancelled(BusError):
 
 
 class ServoLink:
-    """A thread that polls `bus` every `period_s`, passing states to `on_state` and problems to `on_problem`.
-
-    The thread continues after a problem.
-    """
+    """A thread that polls `bus` every `period_s`, calls `on_state` and `on_problem`, and continues after a problem."""
 
     def __init__(
         self,
