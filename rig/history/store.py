@@ -108,7 +108,7 @@ class KeptRun:
 
 @contextmanager
 def open_history(where: str | HistoryAddress | None = None) -> Iterator["History"]:
-    """Yield a history, given by file or URL, by default the user's own; create or migrate its tables if necessary.
+    """Open a history, given by file or URL, for the block, by default the user's own; make or migrate its tables.
 
     Raise Refused `history_unreachable`, `history_too_old`, `history_too_new`, `not_a_history`, `missing_extra`;
     `history_gone` or `history_exchanged` if this process has opened it before and it is missing or has been replaced.
