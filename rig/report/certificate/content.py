@@ -37,7 +37,7 @@ from rig.turners.turner_registry import words_of
 
 @dataclass(frozen=True, slots=True)
 class CertifiedGyroscope:
-    """One calibrated gyroscope: its result, and its verification, if any."""
+    """One calibrated gyroscope: its result (`sensor`), and its verification, if any."""
 
     name: str
     sensor: GyroscopeEntry
@@ -66,7 +66,7 @@ class RestCalibration:
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """A finding, its further characteristics, and the macro that prints them: `macro_path`, as `template:macro`."""
+    """A finding with its further characteristics (`terms`), and the `template:macro` that prints both."""
 
     macro_path: str
     finding: Finding[Any]

@@ -38,7 +38,7 @@ class AxisRow:
 
 @dataclass(frozen=True, slots=True)
 class CheckRow:
-    """One limit and the value compared with it."""
+    """One check as texts: the value and its U, the limit, and the probability of a false acceptance."""
 
     name: str
     value: str

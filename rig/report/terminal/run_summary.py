@@ -25,7 +25,7 @@ MIN_WIDTH = 80  # columns: a narrower screen has more lines
 
 @dataclass(frozen=True, slots=True)
 class _SensorValues:
-    """A calibrated sensor, its label, and its values."""
+    """A calibrated sensor: its kind, its label, its entry, and the row of its values (`shown`)."""
 
     kind: str
     label: str

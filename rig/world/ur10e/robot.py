@@ -52,7 +52,7 @@ class Program(Protocol):
 
 @dataclass(slots=True)
 class RegisterBank:
-    """The general-purpose registers of one direction."""
+    """The general-purpose registers of one direction, inputs or outputs."""
 
     bits: list[bool] = field(default_factory=lambda: [False] * 128)
     ints: list[int] = field(default_factory=lambda: [0] * 48)

@@ -156,7 +156,7 @@ class StateStream:
         return packets
 
     def _check(self, packet: StatePacket) -> Problem | None:
-        """Return a problem if the controller's clock was set since the last state. Raise `ImpossibleState` for such."""
+        """Return a problem if the clock was set since the last state. Raise `ImpossibleState` for a wrong state."""
         before, after = self._last, packet.state
         impossible = impossible_state(after) or impossible_payload(packet.payload_kg, packet.payload_centre_m)
         step = None

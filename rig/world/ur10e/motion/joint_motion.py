@@ -21,7 +21,7 @@ SCALING_RATE_PER_S = 4.0  # after the slider, pause or play: at most a quarter o
 
 @dataclass(frozen=True, slots=True)
 class Instant:
-    """The six joints at one time: commanded and actual."""
+    """The six joints at one time: commanded (`target_…`) and actual."""
 
     target_q_rad: Joints
     target_qd_rad_s: Joints

@@ -21,7 +21,7 @@ STEP_S = 1e-4
 
 @dataclass(frozen=True, slots=True)
 class TcpMotion:
-    """Speed and acceleration (m, rad, s) in the base's axes, and the accelerometer (m/s²) in the flange's."""
+    """Speed and acceleration (m, rad, s) in the base's axes, and the accelerometer's reading (m/s²) in the flange's."""
 
     speed: tuple[float, ...]
     acceleration: tuple[float, ...]
