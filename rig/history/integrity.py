@@ -78,7 +78,7 @@ def _record(past: Past) -> HistoryRecord:
 
 
 def _files_by_folder(history: History) -> Mapping[str, set[tuple[str, str]]]:
-    """Return the entered files by folder; a resumed run was entered repeatedly from the same folder."""
+    """Return name and SHA-256 of the files entered from each folder; a resumed run was entered repeatedly."""
     by_folder: dict[str, set[tuple[str, str]]] = {}
     for path, name, sha256 in history.files():
         by_folder.setdefault(path, set()).add((name, sha256))

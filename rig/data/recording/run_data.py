@@ -1,4 +1,4 @@
-"""A recording in memory. A plan needs only its type, so the types of the contents are not imported at run time."""
+"""A recording in memory: the content of a run file."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # a plan needs only the type of a recording, not those of its contents
     from rig.data.quantity import Quantity, Scalar
     from rig.data.recording.motion_file import ExternalReadings
     from rig.data.recording.provenance import Provenance
