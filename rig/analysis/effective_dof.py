@@ -96,9 +96,10 @@ def _axis_dof(result: "AccelerometerResult | MagnetometerResult", response: Arra
 
 
 def _attitude_dof(budget: Budget, response: Array, noise: Array, std: Array) -> Array:
-    """Return the degrees of freedom of `std` (q,) of values with the `response` (q, n) to readings.
+    """Return the degrees of freedom of the standard deviations `std` (q,) of q angles.
 
-    `noise` (n, n) is the covariance of the readings.
+    `response` (q, n) is the derivative of the angles by the readings, whose covariance is `noise` (n, n). The part of
+    the variance that is not due to noise has the degrees of freedom of the attitudes in the `budget`.
     """
     from rig.estimation.reference.reference_budget import ATTITUDES
 

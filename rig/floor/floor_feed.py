@@ -79,7 +79,7 @@ def _read_past(history: History, today: date) -> dict[str, Any]:
 
 
 def _count_entries(history: History) -> tuple[int, int]:
-    """Return numbers that change with every entry, because rows are only added."""
+    """Return the numbers of calibrations and of voided ones; one of them grows with every entry of the history."""
     counts = (select(func.count()).select_from(table) for table in (schema.calibration, schema.voided))
     with history.engine.connect() as connection:
         calibrations, voided = (int(connection.scalar(question) or 0) for question in counts)

@@ -73,7 +73,10 @@ def _has_settled(ratios: Sequence[float]) -> bool:
 
 
 def _is_steady(ratios: Sequence[float], spans: int, least: float) -> bool:
-    """Return whether the newest `spans` scatter at least `least` times as much as equally many spans before them."""
+    """Return whether the scatter no longer decreases: the sum of the newest ratios is near that of those before.
+
+    `spans` is the number of ratios in either sum; `least` is the smallest ratio of the sums that counts as steady.
+    """
     newest, before = ratios[:spans], ratios[spans : 2 * spans]
     return len(before) == spans and sum(newest) >= least * sum(before)
 

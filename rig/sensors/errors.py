@@ -4,4 +4,4 @@ from rig.errors import ProblemError
 
 
 class SensorError(ProblemError):
-    """An error of a sensor on its own port, or of its line (`no_kvh`, `kvh_axes_not_identity`, …)."""
+    """An error of a sensor on its own port, or of the serial line to it (`no_kvh`, `kvh_axes_not_identity`, …)."""

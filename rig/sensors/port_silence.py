@@ -1,4 +1,7 @@
-"""The silence of a sensor with a port of its own, measured by reads of the port and by another clock."""
+"""The silence of a sensor with a port of its own: the time for which reads of the port brought nothing.
+
+Where another instrument's clock is known, the silence is not longer than the time that passed on this clock.
+"""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Scales of readings that are sent as fractions; samples hold far finer integers. Pure."""
+"""Channels of readings that a source sends as decimal numbers. They are stored as integers of a much smaller unit."""
 
 from rig.config.sensors.stated_temperature import StatedTemperatureSection
 from rig.data.quantity import Quantity

@@ -58,10 +58,10 @@ CONVERTER_DIGITS = Digits(True, Steps(1.0))
 
 
 def find_digits(sensor: RecordedSensor, quantity: Quantity, samples: Sequence[NDArray[Any]]) -> Digits:
-    """Return the digits of a sensor's quantity, from all samples (n,) of each recording.
+    """Return the steps of a quantity's recorded numbers, from all samples (n,) of each recording.
 
     A board records the counts of the part's converter. Other sources send computed or printed numbers. If such a number
-    changes in steps of several recorded counts, it has no bits to test.
+    changes in steps of several recorded counts, it has no bits to test. A step is at least one count.
     """
     channel = sensor.channel(quantity)
     steps = channel.steps(

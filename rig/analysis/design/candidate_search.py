@@ -134,7 +134,7 @@ class ShortestRun:
 
     - `before`: the procedure in the file, None if its uncertainty cannot be predicted.
     - `best`, `nearest`: as in `SearchResult`.
-    - `endless`: the budgets of all evaluated plans and, for each family of candidates, of a run of unlimited length.
+    - `endless`: the budgets of all evaluated plans, and those of a run of unlimited length for each family.
     - `unreachable`: whether no run of this kind meets the target, however long.
     - `directions` (N, 3): the sweeps' directions, None if there are none.
     """

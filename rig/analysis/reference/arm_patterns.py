@@ -58,7 +58,7 @@ def list_arm_rotations(postures: Sequence[Posture], arm: DenavitHartenberg, moun
 
 
 def _error_fractions() -> Array:
-    """Return each wrist error (18,) as a fraction of the arm's error."""
+    """Return the size (18,) of the six errors of each wrist, relative to the error that is stated for the arm."""
     return np.tile(np.where(np.arange(WRIST_ERRORS) < CONSTANTS, 1.0, WAVE_RATIO), 3)
 
 

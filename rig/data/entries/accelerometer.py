@@ -78,7 +78,7 @@ class AccelerometerEntry(Entry):
     - detection_limits: faults during the recording, and the sizes from which they are detected.
     - conditions: times and temperature (temperature_c) of the readings for scale and bias.
     - …_degrees_of_freedom: degrees of freedom of the standard deviations of that name, null if infinite.
-    - placement: errors of the placements, if a file gave the attitudes; range and temperature are then unknown.
+    - placement: errors of the placements, if a file gave the attitudes; range_m_s2 and temperature are then null.
     - correction_matrix: M of s = M (a − b), first order: with an alignment in the frame of the gyroscope's corrected
       rates (whole matrix), else in the right-angled frame nearest to the accelerometer's own axes.
     """

@@ -82,7 +82,7 @@ class MagnetometerEntry(Entry):
 
     - Iron and currents that turn with the magnetometer are part of F and b; hard_iron_t is F⁻¹ b. There are no limits.
     - arm_field_in_bias: whether the bias contains the arm's own field that turns with the flange, which no residual
-      shows; runs with the sensor turned over separate it (`rig reversal`).
+      shows; a run with the sensor turned over separates the two (`rig reversal`).
     - extension_m: its position on the flange; uniformity: test that the field was the same in all attitudes; drift:
       test that it remained the same, null without tests.
     - covariance: of scale and bias, from the solution alone; covariance_combined: from all contributors in budget.
@@ -91,7 +91,7 @@ class MagnetometerEntry(Entry):
       estimated from the readings.
     - detection_limits: faults during the recording, and the sizes from which they are detected.
     - conditions: times of the readings; non_orthogonality_degrees_of_freedom: null if infinite.
-    - placement: errors of the placements, if a file gave the attitudes; the range is then unknown.
+    - placement: errors of the placements, if a file gave the attitudes; range_t is then null.
     - correction_matrix: M of B = M (m − b), in the right-angled frame nearest to the magnetometer's own axes.
     """
 

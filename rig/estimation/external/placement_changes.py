@@ -3,8 +3,8 @@
     v_m = F s + b + (h  or  diag(h) F s,  from one placement on) + errors of the placements + noise
 
 v_m is a reading of the reference s by a sensor with the matrix F and the bias b; h (3,) is the change of the bias, or
-the relative change of each axis' scale factor. The errors are those of `rig.estimation.external.placement_model`, whose
-sizes the placements themselves determine.
+the relative change of each axis' scale factor. The errors are those of `rig.estimation.external.placement_model`; the
+placements themselves determine the sizes of these errors.
 """
 
 import numpy as np

@@ -104,8 +104,8 @@ class Accumulator:
     def solve(self, estimator: SixObservationEstimator = "newton") -> Solution:
         """Return scale factors and biases with their covariance.
 
-        `newton` subtracts their mean from the readings first, because otherwise the design of the paper's Eq. (7) is
-        singular if the scaled bias is as large as the speed. `algorithm_1` uses the readings as published. Raise Fault
+        `newton` subtracts the mean of all readings first, because otherwise the design of the paper's Eq. (7) is
+        singular if the scaled bias is as large as the speed. `algorithm_1` is as published, without that. Raise Fault
         `too_few_observations`, `rank_deficient`, `negative_square`, `algorithm_1_diverged`, `wrong_unit`.
         """
         check_count(self.count, 6, 6)

@@ -184,7 +184,10 @@ class _IncrementSteps:
         return np.asarray(-_matrices(self.vectors / 2) @ inverse, dtype=np.float64)
 
     def sensitivities(self, attitudes: Array, inverse: Array) -> Array:
-        """Return the contribution (k, 3, 12) of each step to the sensitivities; steps start at `attitudes`."""
+        """Return what each step adds to S (k, 3, 12), the derivatives of the attitude by F and the offset.
+
+        The steps start at `attitudes` (k, 3, 3); `inverse` (3, 3) is F⁻¹.
+        """
         per_rate_error = (attitudes @ self.differentiate(inverse))[..., None]
         per_matrix = (per_rate_error * self.integrals_rad[:, None, None, :]).reshape(-1, 3, 9)
         return np.concatenate([per_matrix, per_rate_error[..., 0] * self.durations_s[..., None]], axis=2)

@@ -128,7 +128,10 @@ def select_sweeps(movement: Movement) -> Array:
 
 
 def repeat_by_segment(values: Array, movement: Movement) -> Array:
-    """Return `values` (N + M,) of N dwells and M sweeps as values (N + 3 M,) of their readings."""
+    """Return `values` (N + M,) of N dwells, then M sweeps, with each sweep's value three times (N + 3 M,).
+
+    A sweep has three readings of each axis: mean, cosine and sine.
+    """
     dwells = len(movement.dwells.readings_m_s2)
     return np.concatenate([values[:dwells], np.repeat(values[dwells:], 3)])
 

@@ -112,7 +112,7 @@ def read_finished_run(folder: Path, document: "ResultDocument | None" = None) ->
 
 
 def document_sha256(folder: Path, name: str) -> str | None:
-    """Return the checksum of a file in a run folder, for result.json its `content_sha256`; None if it is missing.
+    """Return the checksum of a file in a run folder, for result.json its `content_sha256`; None without the file.
 
     Raise OSError, and UnfitFile for a file that cannot belong to a run.
     """

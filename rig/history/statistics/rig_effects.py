@@ -1,4 +1,4 @@
-"""Effects of rigs on results, which sensors calibrated on several rigs separate from the sensors' own effects."""
+"""Effects of rigs on results. Sensors that were calibrated on several rigs separate them from the sensors' effects."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

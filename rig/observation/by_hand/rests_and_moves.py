@@ -61,7 +61,7 @@ class NotCounted:
     - `moves`, `rests`: the intervals of refused moves and rests.
     - `seams`: the middles of the gaps between recordings.
     - `from_s`: the time before which everything is left out.
-    - `microsecond_s`: the true duration, s, of a microsecond of the sensor's clock, in which events state times.
+    - `microsecond_s`: the true duration, s, of a microsecond of the sensor's clock, because events use that clock.
     """
 
     moves: list[tuple[float, float]] = field(default_factory=list)

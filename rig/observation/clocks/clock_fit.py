@@ -80,7 +80,10 @@ def _is_contradiction(clock: TimeBase, refined: TimeBase) -> bool:
 def _list_stages(
     clock: TimeBase, board_time_s: Array, readings: Array, motion: KnownMotion
 ) -> Iterator[tuple[Array, Array, KnownMotion]]:
-    """Yield times, readings and motion for each fit: averaged over long times, over short times, and not averaged."""
+    """Yield times, readings and motion for each fit: averaged over long times, then over short times.
+
+    Readings that are too few or too slow for the second average are yielded without it.
+    """
     start_s, end_s = clock.controller_time_s(board_time_s[[0, -1]]).tolist()
     step_s = median_step(board_time_s)
     for over_s in (SLOW_AVERAGE_S, FINE_AVERAGE_S):

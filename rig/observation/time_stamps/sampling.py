@@ -168,8 +168,12 @@ def _list_wider(time_s: Array) -> list[_PeriodCandidate]:
 
 
 def _select_candidate(candidates: Sequence[_PeriodCandidate], typical_s: float) -> _PeriodCandidate | None:
-    """Return the narrowest candidate that fits with few gaps, or None. Wide candidates hide losses."""
-    # The steps inside a burst would make the time between bursts look like a gap.
+    """Return the first of the `candidates` that fits with few gaps, or None.
+
+    They are sorted by width, the number of readings in a packet: a wide packet hides losses. `typical_s` is the typical
+    interval between readings.
+    """
+    # A much shorter interval is one inside a burst; with it the time between bursts would look like a gap.
     fitting = [
         candidate for candidate in candidates if candidate.fit >= MIN_FIT and candidate.interval_s > typical_s / 2
     ]

@@ -64,7 +64,7 @@ def write_figures(outcome: Outcome, document: ResultDocument, folder: Path) -> t
 
 
 def draw_verifications(verifications: Iterable[Verification], folder: Path) -> tuple[RunEvent, ...]:
-    """Draw `verification_<sensor>_before`, if any, and `…_after` for each; return as `write_pictures` does."""
+    """Draw `verification_<sensor>_before`, if any, and `…_after` for each, and return the event of `write_pictures`."""
     pictures = [
         Picture(
             f"verification_{verification.sensor}_{when}",

@@ -82,7 +82,7 @@ def find_printed_indices(budget: BudgetEntry, scale: Sequence[float]) -> tuple[i
 
 @dataclass(frozen=True, slots=True)
 class _Size:
-    """The `unit` of a column's printed numbers: standard uncertainties times `factor`, rounded to `decimals`."""
+    """The form of a column's standard uncertainties, which are printed in `unit`, times `factor`, with `decimals`."""
 
     unit: str
     factor: float

@@ -116,7 +116,7 @@ def speed_limited(state: ArmState) -> Problem:
 
 
 def payload_refused(carried: FlangeLoad) -> Problem:
-    """Return the problem of a program that the controller has ended because of its payload."""
+    """Return the problem of a program that the controller has ended because of the payload on the flange."""
     return Problem(
         "payload_not_set",
         f"the controller does not take a payload of {carried.payload_kg:g} kg",

@@ -89,10 +89,10 @@ class SensorTruth:
 
 
 def build_sensor_rotation(mounting: MountingSection, mounting_error_deg: Sequence[float]) -> list[list[float]]:
-    """Return the rotation (rows) from the flange's axes to the sensor's.
+    """Return the rows of the matrix that takes a vector's components from the flange's axes to the sensor's.
 
     The sensor is mounted as `mounting` states, then rotated by the rotation vector `mounting_error_deg` (degrees, in
-    its own nominal axes). A vector's components therefore change by the inverse of that rotation.
+    its own nominal axes). If the axes are rotated, the components of a fixed vector change by the inverse rotation.
     """
     x, y, z = (radians(angle) for angle in mounting_error_deg)
     error = np.array(rotation_from_vector((x, y, z)))

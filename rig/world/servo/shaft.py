@@ -99,5 +99,5 @@ class Shaft:
 
 
 def whole_turns(angle_rad: float) -> float:
-    """Return the whole revolutions of an angle, rad, which a loss of power erases."""
+    """Return the part of an angle, rad, that is whole revolutions: a loss of power makes the servo forget it."""
     return angle_rad // (2 * pi) * 2 * pi
