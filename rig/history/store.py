@@ -243,7 +243,7 @@ class History:
             yield from journal.broken(connection)
 
     def head(self) -> journal.Head:
-        """Return the end of the journal, as `journal.head` does."""
+        """Return the end of the journal, which a later check compares with what it finds."""
         with self.engine.connect() as connection:
             return journal.head(connection)
 

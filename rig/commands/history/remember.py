@@ -39,7 +39,7 @@ def remember(folder: Path, section: "HistorySection") -> tuple[RunEvent | None, 
 
 
 def remember_own(folder: Path, named: str | None) -> tuple[RunEvent | None, tuple[CalibrationComparison, ...]]:
-    """Enter the run of `folder` into the user's own history, or the `named` one. Return as `remember` does."""
+    """Enter the run of `folder` into the user's own history, or the `named` one; return what `remember` returns."""
     from rig.history.storage.address import default_history_address
 
     return _enter_run(folder, lambda: default_history_address(named))

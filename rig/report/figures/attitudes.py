@@ -39,7 +39,7 @@ class AttitudePlot:
 
 
 def write_attitude_figures(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
-    """Draw `accelerometer_<sensor>` and `magnetometer_<sensor>`; return the event as `write_pictures` does."""
+    """Draw `accelerometer_<sensor>` and `magnetometer_<sensor>`; return the event that names them."""
     return write_pictures(
         [
             Picture(

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def write_drift_figures(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
-    """Draw `bias_drift_<sensor>` for each sensor with biases by repeat; return the event as `write_pictures` does."""
+    """Draw `bias_drift_<sensor>` for each sensor with biases by repeat; return the event that names them."""
     return write_pictures(
         [
             Picture(

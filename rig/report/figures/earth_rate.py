@@ -24,7 +24,7 @@ GAP_S = 1.0
 
 
 def write_earth_rate_figures(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
-    """Draw `earth_rate_<sensor>` for each sensor that measured it; return the event as `write_pictures` does."""
+    """Draw `earth_rate_<sensor>` for each sensor that measured it; return the event that names them."""
     solved = {
         name: (result.explained, earth)
         for name, result in outcome.results.items()

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def write_temperature_figures(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
-    """Draw `over_temperature_<sensor>` for each sensor with polynomials; return the event as `write_pictures` does."""
+    """Draw `over_temperature_<sensor>` for each sensor with polynomials; return the event that names them."""
     return write_pictures(
         [
             Picture(

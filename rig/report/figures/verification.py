@@ -59,12 +59,12 @@ def write_pictures(pictures: Sequence[Picture], folder: Path) -> tuple[RunEvent,
 
 
 def write_figures(outcome: Outcome, document: ResultDocument, folder: Path) -> tuple[RunEvent, ...]:
-    """Draw the verifications of a run into `folder`, and return the event, as `draw_verifications` does."""
+    """Draw the verifications of a run into `folder`, and return the event that names the pictures."""
     return draw_verifications(outcome.verifications.values(), folder)
 
 
 def draw_verifications(verifications: Iterable[Verification], folder: Path) -> tuple[RunEvent, ...]:
-    """Draw `verification_<sensor>_before`, if any, and `…_after` for each, and return the event of `write_pictures`."""
+    """Draw `verification_<sensor>_before`, if any, and `…_after` for each; return the event that names them."""
     pictures = [
         Picture(
             f"verification_{verification.sensor}_{when}",

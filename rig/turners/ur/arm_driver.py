@@ -237,7 +237,7 @@ class Arm:
         self._close()
 
     def _close(self) -> str | None:
-        """Stop and end as `close` does. Return a warning if a client's program may still run on the controller."""
+        """Carry out `close`, and return a warning if a client's program may still run on the controller, else None."""
         try:
             outcome = self.stop()
         finally:
