@@ -61,6 +61,7 @@ def test_under_a_ceiling_the_attitudes_tell_as_much() -> None:
     assert ceiling.sensors["mpu9250"].bias_std_m_s2 == pytest.approx(floor.sensors["mpu9250"].bias_std_m_s2)
 
 
+@pytest.mark.slow
 def test_what_the_configuration_states_of_the_arm_is_a_half_width() -> None:
     assert account("uncertainty.axis_deg=0.3").attitude_std_rad == pytest.approx(radians(0.3) / sqrt(3))
 

@@ -161,6 +161,7 @@ class Contrary:
         return [*wrong, {"mount": "", "go": "go"}.get(kind, "yes")]
 
 
+@pytest.mark.slow
 def test_a_batch_loses_no_part_whatever_is_typed_or_scanned_at_each_question(tmp_path: Path) -> None:
     """One part ends in a fault first, one number comes twice: so every kind of question is asked."""
     faults = {"G-002": [Fault("board_link_lost", "the cable was pulled out", "Plug it in")]}

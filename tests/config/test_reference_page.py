@@ -34,6 +34,7 @@ def made() -> str:
     return reference()
 
 
+@pytest.mark.slow
 def test_the_committed_page_is_what_the_models_generate() -> None:
     page = (DOCS / "configuration.md").read_text(encoding="utf-8")
     assert page == reference(), "again: python -m rig.config.reference_page > docs/configuration.md"

@@ -21,6 +21,7 @@ def test_what_was_written_by_the_first_version_is_read_and_written_again_byte_by
     assert read_result(file).text() + "\n" == file.read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_the_committed_schema_is_that_of_the_model() -> None:
     committed = (DOCS / "result.schema.json").read_text(encoding="utf-8")
     assert committed == schema_text(), "again: python -m rig.data.result_file > docs/result.schema.json"

@@ -115,6 +115,7 @@ def test_full_rank_leaves_nothing_undetermined() -> None:
     assert (faces.rank, faces.undetermined) == (14, ())
 
 
+@pytest.mark.slow
 def test_what_is_expected_is_what_a_fit_reaches() -> None:
     attitudes, rng = flange_to_base(OPTIMAL_ATTITUDES), np.random.default_rng(5)
     std = MPU9250 / np.sqrt(3)

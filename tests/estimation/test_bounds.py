@@ -41,6 +41,7 @@ def minute(speed: float) -> tuple[Array, Array, Array]:
     return rates, variances, noisy(rates @ MOUNTING.T / SCALE - BIAS, variances, runs=RUNS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speed", [np.pi / 3, 3.0])
 def test_closed_form_and_vector_model_are_efficient(speed: float) -> None:
     rates, variances, means = minute(speed)
@@ -122,6 +123,7 @@ def test_the_six_directions_are_g_optimal(model: Model) -> None:
     np.testing.assert_allclose(prediction_variance(six, six, model), PARAMETER_COUNT[model], rtol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["squared", "vector"])
 def test_no_design_is_better_than_the_number_of_parameters(model: Model) -> None:
     rng = np.random.default_rng(1)

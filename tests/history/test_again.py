@@ -50,6 +50,7 @@ def scaled(by: float) -> Sequence[float]:
     return (SCALE[0] + by, *SCALE[1:])
 
 
+@pytest.mark.slow
 def test_what_the_recordings_give_as_it_was_stated_is_not_looked_at(history: History) -> None:
     run = finish_run(0)
     history.enter(run)
@@ -59,6 +60,7 @@ def test_what_the_recordings_give_as_it_was_stated_is_not_looked_at(history: His
     assert all(move.size == 0 for move in found.moves[1])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("by", "of_u", "moved"), [(0.4 * U, 0.5, ()), (0.6 * U, 0.5, (1,)), (-0.6 * U, 0.5, (1,))])
 def test_a_value_moves_by_its_part_of_the_stated_u(
     by: float, of_u: float, moved: tuple[int, ...], history: History
@@ -110,6 +112,7 @@ def test_a_certificate_falls_with_what_the_method_refuses_and_is_unconfirmed_by_
     assert (len(found.withdrawn), len(found.unconfirmed)) == (withdrawn, unconfirmed) and not found.same
 
 
+@pytest.mark.slow
 def test_certificates_that_are_marked_or_replaced_are_not_withdrawn_once_more(history: History) -> None:
     run = finish_run(0)
     history.enter(run)
@@ -120,6 +123,7 @@ def test_certificates_that_are_marked_or_replaced_are_not_withdrawn_once_more(hi
     assert found.verdict_changed and [each.number for each in found.withdrawn] == ["RIG-2"]
 
 
+@pytest.mark.slow
 def test_a_replaced_result_is_solved_again_only_where_a_certificate_relies_on_it(history: History) -> None:
     first, later = finish_run(0, solved_after_s=60), finish_run(0, scaled(U), solved_after_s=3600)
     history.enter(first)
@@ -132,6 +136,7 @@ def test_a_replaced_result_is_solved_again_only_where_a_certificate_relies_on_it
     ]
 
 
+@pytest.mark.slow
 def test_what_was_voided_does_not_count_and_a_selection_is_heeded(history: History) -> None:
     for day in range(3):
         history.enter(finish_run(day, serial_number=f"G-{day}"))
@@ -161,6 +166,7 @@ def test_answers_to_another_question_are_not_mixed(tmp_path: Path) -> None:
             RecomputeJournal(tmp_path, other)
 
 
+@pytest.mark.slow
 def test_what_is_solved_is_not_solved_again_and_what_is_not_is_tried_again(history: History) -> None:
     runs = [finish_run(day) for day in range(3)]
     for run in runs:

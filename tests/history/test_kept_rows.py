@@ -182,6 +182,7 @@ def test_a_journal_that_was_written_anew_or_cut_short_is_told_by_who_knows_its_e
         assert history.holds(Head(0, ""))
 
 
+@pytest.mark.slow
 def test_a_result_that_was_changed_with_its_own_hash_is_named(tmp_path: Path) -> None:
     file = str(tmp_path / "history.sqlite")
     run = finish_run(0)

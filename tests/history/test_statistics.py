@@ -54,6 +54,7 @@ def test_an_uncertainty_is_never_below_what_the_values_say_of_themselves() -> No
     assert found.std[0] == pytest.approx(0.3 / np.sqrt(6))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("spread", [0.0, 2.0])
 def test_a_drift_s_uncertainty_covers_it(spread: float) -> None:
     rng, covered = random(5), 0

@@ -41,6 +41,7 @@ def history(tmp_path: Path) -> Iterator[History]:
         yield opened
 
 
+@pytest.mark.slow
 def test_a_run_is_found_again_with_all_its_numbers(history: History) -> None:
     run = read_finished_run(RECORDINGS / "verified")
     entered = history.enter(run)
@@ -66,6 +67,7 @@ def test_the_mean_scale_factor_has_the_uncertainty_of_all_three() -> None:
     assert mean.std_statistical == pytest.approx(variance**0.5)
 
 
+@pytest.mark.slow
 def test_the_same_run_again_adds_nothing_but_the_place_it_lies_in_now(history: History) -> None:
     first = history.enter(finish_run(0))
     moved = finish_run(0, solved_after_s=3600)  # solved again, with the same numbers
@@ -76,6 +78,7 @@ def test_the_same_run_again_adds_nothing_but_the_place_it_lies_in_now(history: H
     assert kept.places == (("bench", "/runs/0"),)
 
 
+@pytest.mark.slow
 def test_a_result_of_the_same_recordings_replaces_the_one_before(history: History) -> None:
     """In series; it stays in the history."""
     history.enter(finish_run(0, (1.02, 1.02, 1.02), solved_after_s=3600))
@@ -85,6 +88,7 @@ def test_a_result_of_the_same_recordings_replaces_the_one_before(history: Histor
     assert [history.calibration(number).value("kx") for number in (1, 2)] == [1.02, 1.01]
 
 
+@pytest.mark.slow
 def test_u_in_a_history_and_its_comparisons_are_those_that_the_results_state(history: History) -> None:
     def scarce(day: float, bias_rad_s: float, dof: float) -> FinishedRun:
         run = finish_run(day, bias_rad_s=(bias_rad_s, 0.0, 0.0))
@@ -107,6 +111,7 @@ def test_u_in_a_history_and_its_comparisons_are_those_that_the_results_state(his
     assert list(history.broken()) == []
 
 
+@pytest.mark.slow
 def test_a_voided_calibration_stands_there_with_its_reason_and_counts_no_more(history: History) -> None:
     history.enter(finish_run(0))
     history.enter(finish_run(1))
@@ -127,6 +132,7 @@ def test_a_measurement_that_failed_its_own_checks_is_no_part_of_a_series(history
     assert subjects([found]) == {}
 
 
+@pytest.mark.slow
 def test_calibrations_are_found_by_sensor_day_and_rig(history: History) -> None:
     history.enter(finish_run(9, serial_number="G-1", rig="bench A"))
     history.enter(finish_run(3, serial_number="G-2", rig="bench B"))
@@ -170,6 +176,7 @@ def test_a_history_from_before_version_1_is_refused_and_stays_as_it_was(marked: 
     assert file.read_bytes() == before
 
 
+@pytest.mark.slow
 def test_who_ran_the_rig_and_what_was_noted_is_found_again(history: History) -> None:
     history.enter(replace(finish_run(0), operator="A. Person", note="after the move to room 3"))
     history.enter(finish_run(1))
@@ -177,6 +184,7 @@ def test_who_ran_the_rig_and_what_was_noted_is_found_again(history: History) -> 
     assert found == [("A. Person", "after the move to room 3"), (None, None)]
 
 
+@pytest.mark.slow
 def test_a_certificate_is_entered_once_by_its_number_and_with_every_file_it_was_written_to(history: History) -> None:
     run = replace(finish_run(0), certificate=ISSUED)
     first = history.enter(run)
@@ -190,6 +198,7 @@ def test_a_certificate_is_entered_once_by_its_number_and_with_every_file_it_was_
     assert not history.certify("0" * 64, ISSUED)  # of a run nobody entered
 
 
+@pytest.mark.slow
 def test_rows_are_only_added(history: History) -> None:
     """What a role may do that can neither change nor remove anything (docs/how-to/finished-runs/shared-history.md)."""
     said: list[str] = []
@@ -202,6 +211,7 @@ def test_rows_are_only_added(history: History) -> None:
     assert "INSERT" in said and set(said) <= {"SELECT", "INSERT", "BEGIN"}
 
 
+@pytest.mark.slow
 def test_a_history_of_a_newer_program_is_refused_and_not_touched(tmp_path: Path) -> None:
     file = tmp_path / "history.sqlite"
     with open_history(str(file)) as history:
@@ -260,6 +270,7 @@ def test_a_server_that_is_not_there_is_named(tmp_path: Path) -> None:
         engine_of(resolve_address("nonsense://x"))
 
 
+@pytest.mark.slow
 def test_what_has_changed_is_named(history: History) -> None:
     history.enter(finish_run(0))
     history.enter(finish_run(30, (1.01 + 4e-4, 0.99, 1.0)))
@@ -282,6 +293,7 @@ def test_a_sensor_s_drift_and_recall_come_out_of_its_history(history: History) -
     assert found["bx"].recall is None  # the result states no limit for it
 
 
+@pytest.mark.slow
 def test_a_limit_stands_beside_its_parameter_whatever_its_check_is_called(history: History) -> None:
     entered = finish_run(0)
     (scale,) = (check for check in entered.document.checks if check.means.parameter == "scale")

@@ -86,6 +86,7 @@ def test_a_wider_terminal_shows_more_columns(history: History) -> None:
     assert "drift a year ± U" in usual and wide == [*(column.heading for column in table.columns if any(column.cells))]
 
 
+@pytest.mark.slow
 def test_a_column_that_holds_nothing_is_left_out(history: History) -> None:
     assert headings(printed(trends_of(a_year(history, runs=2))[0], 140)) == ["parameter", "trend", "last ± U", "runs"]
 
@@ -122,6 +123,7 @@ def test_no_drift_a_year_is_stated_of_a_few_days(history: History, step_days: fl
     assert any("need 10 days" in line for line in trend_lines(found)) != stated
 
 
+@pytest.mark.slow
 def test_the_mean_scale_factor_is_explained_where_it_is_printed(history: History) -> None:
     _, found = trends_of(a_year(history, runs=2))
     assert any(line.startswith("k: the mean of the scale factors") for line in trend_lines(found))
@@ -152,6 +154,7 @@ def test_one_alarm_is_one(history: History) -> None:
     assert "in control; 1 alarm before" in printed(table, 140)
 
 
+@pytest.mark.slow
 def test_a_void_calibration_and_one_by_its_day_are_still_told_at_sixty_columns(history: History) -> None:
     a_year(history, runs=2)
     history.void(2, "another sensor was mounted")

@@ -72,6 +72,7 @@ def test_an_export_without_its_extra_names_the_command_and_leaves_no_folder(
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_a_wheel_in_site_packages_is_no_folder_of_sources(tmp_path: Path) -> None:
     wheel = tmp_path / "calibration_rig-9-py3-none-any.whl"
     wheel.touch()

@@ -152,6 +152,7 @@ def test_wrist_3_of_a_ur3e_turns_without_end() -> None:
     assert [each for each in turned("ur5e", 5, 60, by_deg=800) if each.startswith("joint_limit")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("model", "most_kg"), [("ur3e", 3), ("ur5e", 5), ("ur7e", 7.5), ("ur10_cb3", 10), ("ur30", 30)]
 )

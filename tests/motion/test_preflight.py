@@ -253,6 +253,7 @@ def test_what_the_flange_carries_is_kept_from_the_forearm_too() -> None:
     assert said == {"payload"}
 
 
+@pytest.mark.slow
 def test_an_extension_is_kept_from_the_forearm_and_from_the_upper_arm() -> None:
     def problems(made: Plan, extension_m: tuple[float, float, float]) -> set[str]:
         return set(names(plan_problems(made, FlangeLoad(0.3, extension_m=extension_m))))

@@ -40,6 +40,7 @@ def test_all_calibrations_of_a_serial_number_are_one_table(place: str) -> None:
     assert len(rig.calibrations("G-2", history=place)) == 1
 
 
+@pytest.mark.slow
 def test_a_serial_number_that_was_never_entered_is_refused(place: str) -> None:
     with pytest.raises(Refused, match=r"not_in_history: .*G-9"):
         rig.calibrations("G-9")

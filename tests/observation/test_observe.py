@@ -193,6 +193,7 @@ def test_the_ripple_of_a_harmonic_drive_is_no_noise_of_a_quiet_sensor(noise_rad_
         np.testing.assert_allclose(observation.average.noise_rad_s, noise_rad_s, rtol=0.12)
 
 
+@pytest.mark.slow
 def test_a_clock_that_runs_far_off_is_refused() -> None:
     with pytest.raises(Fault, match="time_base_not_found"):
         look(synthetic_run(Setup(drift=0.06)))

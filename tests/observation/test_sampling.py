@@ -111,6 +111,7 @@ def test_a_few_long_gaps_are_no_bursts() -> None:
     assert (find_sampling_times(time_s, found) == time_s).all()
 
 
+@pytest.mark.slow
 def test_stamps_too_uneven_to_count_losses_say_so() -> None:
     rng = np.random.default_rng(51)
     arrived_s = np.maximum.accumulate(taken(100) + rng.exponential(0.015, size=COUNT)) + 1e-6 * np.arange(COUNT)

@@ -61,6 +61,7 @@ def test_a_clock_whose_noise_seems_correlated_at_every_other_step_is_found() -> 
     assert clock.offset_std_s < 1e-4 and clock.drift == pytest.approx(580e-6, abs=10e-6)  # the whole run's
 
 
+@pytest.mark.slow
 def test_a_clock_whose_offset_begins_right_is_not_found_before_its_drift() -> None:
     """The first reading's time chooses where the fit begins: its first step moves the drift by 368 ppm of 1000 here,
     and the offset by less than a thousandth of its standard deviation."""

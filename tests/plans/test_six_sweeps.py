@@ -43,6 +43,7 @@ def test_six_axes_are_the_three_and_three_between_them() -> None:
     assert plan_problems(made, FlangeLoad(0.35)) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wrist_2_deg", [-90.0, 90.0])
 def test_the_flange_never_turns_towards_the_forearm(wrist_2_deg: float) -> None:
     """Wrist 1 turns in the forearm's plane: along its axis the flange keeps its distance, 0.174 m, or has more."""

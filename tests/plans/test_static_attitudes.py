@@ -136,6 +136,7 @@ def test_repeats_are_counted_on_and_what_is_done_is_left_out() -> None:
     assert plan_static_attitudes(ARM, section, done=range(24)).steps == ()
 
 
+@pytest.mark.slow
 def test_sweeps_and_attitudes_take_five_minutes_with_every_wait_for_settling() -> None:
     made = imu()
     assert (len(made.sweeps), len(made.dwells)) == (12, 18)

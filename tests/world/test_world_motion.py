@@ -119,6 +119,7 @@ def test_the_rate_is_the_derivative_of_the_angle_at_any_instant_of_a_tick() -> N
                 assert (after - before) / 2e-6 == pytest.approx(player.motion.joints_at(end - inside)[1][4], abs=1e-5)
 
 
+@pytest.mark.slow
 def test_the_measured_turn_takes_the_time_of_the_smooth_speed() -> None:
     """Two passes of the joint, a whole turn apart, give the commanded speed whatever the vibration."""
     player = Player(0.08, start=turned(HOME, 5, -3.6))

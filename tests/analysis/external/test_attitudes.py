@@ -262,6 +262,7 @@ def test_what_is_wrong_is_refused_by_name(what: str, tmp_path: Path, capsys: pyt
     assert re.search(name, said), said
 
 
+@pytest.mark.slow
 def test_what_the_sensor_does_not_need_is_refused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     """A linear sensor has no second order; nobody's rates are exact unless it is said."""
     assert main(solve(example(STILL), "--estimator", "vector")) == 2

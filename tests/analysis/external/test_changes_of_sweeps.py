@@ -100,6 +100,7 @@ def test_whole_turns_in_degrees_are_told_though_no_speed_is_unusual(tmp_path: Pa
     assert first.startswith("each sweep turns by a whole multiple of 90 rad") and "if both files are in °/s" in first
 
 
+@pytest.mark.slow
 def test_a_body_that_shakes_in_its_turns_is_no_unit_that_is_wrong(tmp_path: Path) -> None:
     log = swept(HZ)
     shake_rad_s = 0.2 * np.sin(2 * np.pi * 7 * log.time_s)[:, None]

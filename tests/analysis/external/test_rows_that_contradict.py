@@ -163,6 +163,7 @@ def test_poses_in_any_order_and_repeated_ones_are_placed_by_their_times(tmp_path
     ]
 
 
+@pytest.mark.slow
 def test_a_clock_that_runs_fast_is_refused_unless_its_offset_is_estimated() -> None:
     samples = read_samples(EXAMPLES / "swinging_samples.csv")
     rows = read_attitudes(EXAMPLES / "swinging_attitudes.csv")

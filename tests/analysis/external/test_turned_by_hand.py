@@ -125,6 +125,7 @@ def test_a_turn_that_was_another_is_named(tmp_path: Path, capsys: pytest.Capture
     assert min(abs(float(named[1]) - session.rows[row, 0]) for row in (3, 9)) < 0.5, "it, or its way back"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stated", [2, 0.5, 350 / 360])
 def test_a_turn_that_ends_alike_or_nearly_so_is_another(stated: float, tmp_path: Path) -> None:
     session = turn(Hand(BOTH_WAYS), 3)
@@ -133,6 +134,7 @@ def test_a_turn_that_ends_alike_or_nearly_so_is_another(stated: float, tmp_path:
         solved(tmp_path, session)
 
 
+@pytest.mark.slow
 def test_one_wrong_angle_of_many_turns_widens_the_uncertainty(tmp_path: Path) -> None:
     session = turn(Hand(BOTH_WAYS, ends_rad=1e-3, leans_rad=1e-3), 3)
     session.rows[5, 5] += np.radians(2)

@@ -27,6 +27,7 @@ KVH = ("--sensor", "kvh1775", "--port", "COM4", "--serial-number", "K-1")
 LINES = ("--sensor", "lines", "--port", "COM4", "--listen", "no")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "words",
     [

@@ -256,6 +256,7 @@ def test_a_run_enters_itself_and_is_held_against_the_last(place: str, capsys: py
     assert "0 changed, 0 missing" in told(capsys, "verify")
 
 
+@pytest.mark.slow
 def test_a_calibration_is_not_void_without_a_reason(year: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["history", "void", "1", "--reason", " "]) == 2
     assert "bad_option: --reason is blank" in capsys.readouterr().err

@@ -52,6 +52,7 @@ def test_a_step_before_the_last_of_some_sweeps_without_rests_is_found(axis: int)
     assert change is not None and change.what == "bias" and change.from_s == len(rates) - 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wrong_rates", [0.0, 1e-3])
 @pytest.mark.parametrize("axes", [[0, 1, 2], [2]])
 def test_a_change_of_scale_factors_is_found_with_its_axes(wrong_rates: float, axes: list[int]) -> None:

@@ -230,6 +230,7 @@ def test_what_is_no_number_is_refused() -> None:
         reduced(samples)
 
 
+@pytest.mark.slow
 def test_a_sway_of_other_joints_is_read_along_the_true_axes_of_the_sensor() -> None:
     """Sensors are mounted askew by degrees: along nominal axes a sway of 2 mrad would be wrong by a mm/s²."""
     sweeps, even = plan_sweeps(6), replace(sampling(0.0, 0.0), encoder_step_rad=1e-15)

@@ -27,6 +27,7 @@ def jumped(repeat: int, axis: int, size: float) -> Array:
     return bias
 
 
+@pytest.mark.slow
 def test_every_bias_is_found_within_its_uncertainty() -> None:
     truth = np.random.default_rng(1).normal(size=(REPEATS, 3)) * 20
     errors = np.array([found(truth, seed).bias - truth for seed in range(40)])

@@ -120,6 +120,7 @@ def test_the_heater_goes_off_by_itself_in_20_of_20(happens: Callable[[int], None
     happens(TIMES)
 
 
+@pytest.mark.slow
 def test_a_program_that_hangs_is_bitten_and_the_heater_goes_off() -> None:
     """The main loop kicks the watchdog by its tick: here the tick fails while the heater is on."""
     image = bytearray(make_shipped_flash().data[:STORE_OFFSET])

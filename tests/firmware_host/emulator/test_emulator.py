@@ -236,6 +236,7 @@ def test_a_broken_rule_is_named_with_its_function(name: str, statement: str, wha
     assert "culprit" in error.what
 
 
+@pytest.mark.slow
 def test_an_access_may_be_right_many_times_before_it_is_wrong(tmp_path: Path) -> None:
     error = failure(
         """
@@ -256,6 +257,7 @@ def test_memory_is_not_zero_at_power_up(tmp_path: Path) -> None:
     assert run(source, tmp_path) == b"\xa5" * 8
 
 
+@pytest.mark.slow
 def test_a_starved_watchdog_resets_the_board(tmp_path: Path) -> None:
     sent = run(
         """
@@ -278,6 +280,7 @@ def test_a_starved_watchdog_resets_the_board(tmp_path: Path) -> None:
     assert sent == power_and_pin + 5 * watchdog_and_pin
 
 
+@pytest.mark.slow
 def test_a_kicked_watchdog_does_not(tmp_path: Path) -> None:
     sent = run(
         """
@@ -359,6 +362,7 @@ def test_the_higher_priority_preempts_and_the_equal_waits(tmp_path: Path) -> Non
     assert run(source % (0x40, 0x80), tmp_path) == b"pqsm"
 
 
+@pytest.mark.slow
 def test_a_masked_interrupt_wakes_the_core_and_runs_once_unmasked(tmp_path: Path) -> None:
     sent = run(
         """
@@ -404,6 +408,7 @@ def test_a_byte_that_arrives_is_an_interrupt(tmp_path: Path) -> None:
     assert board.take_sent() == b"IBM"
 
 
+@pytest.mark.slow
 def test_instructions_take_a_cycle_each_and_every_line_of_the_flash_its_wait_states(tmp_path: Path) -> None:
     """A loop of four narrow instructions in one line of 64 bits, then in two; the chip's cache would spare the wait."""
     source = """
@@ -434,6 +439,7 @@ def test_instructions_take_a_cycle_each_and_every_line_of_the_flash_its_wait_sta
     assert 1200 <= over_two <= 1250
 
 
+@pytest.mark.slow
 def test_an_exception_takes_its_cycles(tmp_path: Path) -> None:
     """Twelve to enter, ten to return, and the vector from the flash."""
     source = """
@@ -488,6 +494,7 @@ def board_with_gyro(source: str, folder: Path) -> EmulatedBoard:
     return tiny_firmware.board(source, folder, [gyro])
 
 
+@pytest.mark.slow
 def test_the_wrong_spi_mode_is_refused(tmp_path: Path) -> None:
     board = board_with_gyro(_ASK_THE_GYRO.format(control=0x35C, after=""), tmp_path)
     with pytest.raises(BoardError, match="SPI1 speaks mode 0 at 5 MHz to the LSM9DS1") as caught:

@@ -75,6 +75,7 @@ def words(sent: bytes) -> list[int]:
     return [int.from_bytes(sent[i : i + 4], "little") for i in range(0, len(sent), 4)]
 
 
+@pytest.mark.slow
 def test_what_is_programmed_is_there_after_a_power_cycle(tmp_path: Path) -> None:
     body = "put_word(REG(STORE)); put_word(REG(STORE + 4)); if (REG(STORE) == ~0u) program(0, 0x01234567, 0x89ABCDEF);"
     one = chip(body, tmp_path)

@@ -4,6 +4,8 @@ import re
 import subprocess
 from functools import cache
 
+import pytest
+
 from firmware_host.emulator.symbols import Symbols
 from firmware_host.emulator.thumb import instructions, is_floating_point, word_accesses
 from support.paths import IMAGE
@@ -47,6 +49,7 @@ def symbols() -> Symbols:
     return Symbols(ELF.read_bytes())
 
 
+@pytest.mark.slow
 def test_instructions_are_told_from_each_other() -> None:
     found = {}
     for start, code in stretches():

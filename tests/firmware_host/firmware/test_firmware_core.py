@@ -21,6 +21,7 @@ def board() -> HostBoard:
 # Requests
 
 
+@pytest.mark.slow
 @settings(max_examples=50)
 @given(st.lists(st.integers(1, 30), max_size=10), st.binary(max_size=60).map(lambda noise: noise.replace(b"\0", b"\1")))
 def test_a_request_in_pieces_after_noise_is_answered(pieces: list[int], noise: bytes) -> None:

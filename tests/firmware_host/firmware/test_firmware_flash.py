@@ -58,6 +58,7 @@ def test_a_doubleword_is_programmed_once_after_an_erase_and_a_refusal_is_told_an
     assert bytes(flash.data[STORE_OFFSET:]).count(0xFF) == STORE_PAGES * PAGE_BYTES - 8
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("operation", ["port_flash_erase(0)", "port_flash_program(0, 0, 1)"])
 def test_nothing_can_be_written_outside_of_an_operation(operation: str, tmp_path: Path) -> None:
     with pytest.raises(BoardError) as caught:
@@ -76,6 +77,7 @@ def test_a_torn_doubleword_is_told_each_time_and_hides_no_other(tmp_path: Path) 
     assert run(body, tmp_path, torn=frozenset({FIRST_RECORD}))[0] == [0, 0, 1, 1, 1]
 
 
+@pytest.mark.slow
 def test_a_torn_doubleword_is_told_also_where_the_chip_has_lost_the_flag_of_it(tmp_path: Path) -> None:
     body = """
         put(port_flash_read(0, 0, bytes, 8));

@@ -190,6 +190,7 @@ def test_the_refusal_names_the_column_to_convert(tmp_path: Path) -> None:
         read_with(tmp_path, lambda lines: [lines[0].replace("x_rad_s", "x_deg_s"), *lines[1:]])
 
 
+@pytest.mark.slow
 def test_a_gap_in_the_samples_is_named(tmp_path: Path) -> None:
     (short,) = read_with(tmp_path, lambda lines: [*lines[:100], *lines[120:]]).omitted
     assert short.count == 20 and short.first.endswith("in row 1")
@@ -232,6 +233,7 @@ def test_axes_with_a_wrong_sign_are_refused(tmp_path: Path, capsys: pytest.Captu
     assert "mirrored_axis" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_readings_of_other_sensors_in_the_samples_change_nothing(tmp_path: Path) -> None:
     def beside(lines: list[str]) -> list[str]:
         rows = (f"{line},0,0,9.81,2e-5,0,4e-5,25" for line in lines[1:])
@@ -262,6 +264,7 @@ def test_people_see_uncertainties_with_one_coverage_factor_and_the_angles_betwee
     assert f"non-orthogonality yz zx xy: {skew:+.3f} ± {factor * known:.2g}" in printed
 
 
+@pytest.mark.slow
 def test_files_of_a_spreadsheet_whose_decimals_have_a_comma_are_read_alike(tmp_path: Path) -> None:
     def as_there(lines: list[str]) -> list[str]:
         return [line.replace(",", ";").replace(".", ",") for line in lines]

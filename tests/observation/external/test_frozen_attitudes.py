@@ -31,6 +31,7 @@ def test_long_rows_of_one_attitude_between_which_the_body_was_lifted_are_rests()
     assert not find_frozen(windows_s, rows.attitudes[[0, 0, 0]], rows.time_s, rows.readings_rad_s).any()
 
 
+@pytest.mark.slow
 def test_times_from_coarse_stamps_are_compared_without_a_warning() -> None:
     rows = turning(follow(World(), 1))
     ordered = order_stamps(np.rint(10 * rows.time_s) / 10, rows.readings_rad_s)

@@ -72,6 +72,7 @@ def write_bag(path: Path, table: dict[str, Any], poses: dict[str, Any] | None = 
             bag.write(connection, at, store.serialize_cdr(message, kind))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("stated", "other", "is_read"),
     [
@@ -107,6 +108,7 @@ def solved(samples: Path, sweeps: Path) -> np.ndarray:
     return np.concatenate([entry.scale, entry.bias_rad_s, np.ravel(entry.covariance)])
 
 
+@pytest.mark.slow
 def test_readings_of_sensors_that_sweeps_do_not_need_may_be_blank(tmp_path: Path) -> None:
     names, *rows = (EXAMPLES / "samples.csv").read_text().splitlines()
     fields = ("2e-5,0,4e-5" if row % 4 == 0 else ",," for row in range(len(rows)))
@@ -123,6 +125,7 @@ def as_csv(path: Path, table: dict[str, Any]) -> None:
     np.savetxt(path, columns, "%.9g", delimiter=",", header=",".join(table), comments="")
 
 
+@pytest.mark.slow
 def test_what_the_user_should_know_of_the_sweeps_of_a_file_is_among_the_notes() -> None:
     files = Files(EXAMPLES / "samples.csv", EXAMPLES / "sweeps.csv", "sweeps", Item("imu", "any", "1"))
     notes = calibrate([build_recording(files, STANDARD, SolveOptions())]).external["imu"].notes
@@ -132,6 +135,7 @@ def test_what_the_user_should_know_of_the_sweeps_of_a_file_is_among_the_notes() 
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axis", [0, 2])
 def test_the_least_certain_scale_factor_is_the_one_that_is_checked(axis: int, tmp_path: Path) -> None:
     table = dict(read_columns(EXAMPLES / "samples.csv", samples_header([RATE]), 256))

@@ -49,6 +49,7 @@ def test_rows_between_reports_are_found_also_through_zero(by: Literal["time", "r
     assert np.abs(np.linalg.norm(quaternions[~mask], axis=1) - 1).max() < 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("poses_hz", [14.0, 100.0, 500.0])
 def test_measured_attitudes_are_all_kept(poses_hz: float) -> None:
     recorded = record(replace(LOG, poses_hz=poses_hz, report_rad=1e-6), 5)
@@ -64,6 +65,7 @@ def test_a_steady_turn_and_a_long_rest_are_measured() -> None:
     assert not find_interpolated(time_s, np.round(quaternions, 7)).any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("length", [0.99, 1.01])
 def test_quaternions_of_another_length_are_not_left_out_as_interpolated(length: float) -> None:
     recorded = record(replace(LOG, poses_hz=100), 5)

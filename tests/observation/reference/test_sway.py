@@ -28,6 +28,7 @@ STEADY = Setup(vibration=0.0, state_rate_hz=500.0)
 STEP_S = 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("hertz", [0.25, 0.4, 0.6])  # 1.5 to 3.6 periods a turn
 def test_the_first_harmonic_is_free_of_the_acceleration_by_wrists_that_sway(hertz: float) -> None:
     setup = replace(STEADY, seen_vibration_rad_s=2.8e-3, seen_vibration_hz=hertz)
@@ -48,6 +49,7 @@ def test_the_first_harmonic_is_free_of_the_acceleration_by_wrists_that_sway(hert
         assert np.abs(kept).max() < 0.1 * np.abs(removed).max() + 1e-5
 
 
+@pytest.mark.slow
 def test_an_acceleration_at_the_end_of_the_range_in_a_turn_is_refused() -> None:
     run, sensor = synthetic_run(Setup(speed_deg_s=120)), load_recording("imu").sensors["gyro"]
     motion, finished = motion_of(run), next(swept(run))
@@ -62,6 +64,7 @@ def test_an_acceleration_at_the_end_of_the_range_in_a_turn_is_refused() -> None:
         swept_acceleration(stream, motion, finished.sweep, turn, run.settings)
 
 
+@pytest.mark.slow
 def test_gravity_axis_and_lever_arm_of_a_turn_belong_to_the_pose_about_which_wrists_sway() -> None:
     """A sway by 2 mrad when a turn begins moves the flange by 0.5 mm: at 60°/s a mean wrong by 0.5 mm/s²."""
     setup = replace(STEADY, seen_vibration_rad_s=2.8e-3, seen_vibration_hz=0.24)
@@ -91,6 +94,7 @@ def test_gravity_axis_and_lever_arm_of_a_turn_belong_to_the_pose_about_which_wri
     assert np.abs(off_m_s2).max() < 2e-4
 
 
+@pytest.mark.slow
 def test_encoders_that_show_noise_only_change_nothing() -> None:
     run = synthetic_run(STEADY)
     motion, finished = motion_of(run), next(swept(run))

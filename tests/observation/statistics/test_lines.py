@@ -36,6 +36,7 @@ def test_of_a_vibration_hardly_more_is_left_than_the_noise(turns: float) -> None
         assert left.std(axis=0).max() < 1.5 * NOISE  # of nine times the noise
 
 
+@pytest.mark.slow
 def test_two_vibrations_that_are_near_each_other_are_told_apart() -> None:
     """Less than three cycles apart, of a quiet sensor that feels one of them come and go."""
     share, quiet = np.arange(COUNT) / COUNT, NOISE / 8
@@ -50,6 +51,7 @@ def test_readings_too_few_to_tell_a_line_have_none() -> None:
     assert find_lines(residuals(1, 20.0, 0.1)[:40], STRICT).size == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bins", [6, 16, 26, 27, 200])
 def test_the_noise_around_a_line_is_the_median_of_its_neighbours(bins: int) -> None:
     """Also where the spectrum, mirrored, is shorter than the median's window: SciPy's filter read other memory then."""

@@ -72,6 +72,7 @@ def test_a_clock_s_offset_is_shown_in_milliseconds_with_twice_its_standard_devia
     assert "the attitudes' clock is +2.50 ± 0.84 ms from the samples'" in text
 
 
+@pytest.mark.slow
 def test_a_path_is_no_markup(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / "[/nope]"
     folder.mkdir(parents=True)

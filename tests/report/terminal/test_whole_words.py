@@ -26,6 +26,7 @@ def words(folder: Path, width: int) -> set[str]:
     return {*FRAME.sub(" ", show(folder, width)).split()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["attitudes", "by_hand", "magnetometer", "swinging", "thermal"])
 def test_degrees_of_freedom_stand_in_one_line_of_80_columns(name: str) -> None:
     def degrees(width: int) -> list[str]:
@@ -34,6 +35,7 @@ def test_degrees_of_freedom_stand_in_one_line_of_80_columns(name: str) -> None:
     assert degrees(80) == degrees(300)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["bias_drift", "by_hand", "mavlink", "thermal", "imu", "magnetometer"])
 def test_every_word_is_whole_in_80_columns(name: str) -> None:
     assert words(FROZEN / name, 80) <= words(FROZEN / name, 300)

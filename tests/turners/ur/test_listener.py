@@ -20,6 +20,7 @@ def test_a_simulated_controller_is_found(world: World) -> None:
     assert find_listener(IPv4Address(laboratory.host), PORT) == laboratory.process.pid
 
 
+@pytest.mark.slow
 def test_one_that_listens_at_every_address_is_found() -> None:
     serving = "import socket; s = socket.create_server(('', 0)); print(s.getsockname()[1], flush=True); input()"
     with subprocess.Popen(

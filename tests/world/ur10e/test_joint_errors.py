@@ -45,6 +45,7 @@ class Player:
         return self.errors.true_state(time_s, *self.motion.state_at(time_s))
 
 
+@pytest.mark.slow
 def test_rates_and_accelerations_are_the_derivatives_of_the_true_angles() -> None:
     """Through ramps, a change of the slider and a stop, with every error there is."""
     player = Player()
