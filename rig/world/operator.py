@@ -64,8 +64,10 @@ class SimulatedOperator:
         """The operator's progress, for tests: the side up, the number of actions, and the mistakes made."""
         return {"face": self._hand.face, "acts": self._acts, "mistakes": self._mistakes}
 
-    def instruct(self, say: str, face: Face, turns: int = 0, *, again: bool = False) -> None:
-        """Replace the pending instruction.
+    def instruct(
+        self, say: str, face: Face, turns: int = 0, *, again: bool = False, mistake: Mistake | None = None
+    ) -> None:
+        """Replace the pending instruction, which is carried out with the `mistake`, drawn at random if None.
 
         Raise ValueError for an unknown instruction. An item that already lies as requested is left alone, unless
         `again`.
@@ -76,7 +78,7 @@ class SimulatedOperator:
             self._pending = None
             return
         thought_s = float(self._mind.uniform(*self._section.reaction_time_s))
-        mistake = self._draw_mistake(say)
+        mistake = mistake or self._draw_mistake(say)
         action: Action = FlipAction(face, mistake) if say == "lay" else TurnAction(int(turns), mistake)
         self._pending = action, max(self.time_s, self._hand.lies_from_s) + thought_s
 

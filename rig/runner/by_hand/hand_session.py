@@ -51,6 +51,7 @@ MAX_REFUSALS = 10  # in a row; then the session ends, because another error is l
 # Moves in a row that contradict those before them; then one of those is likely to be wrong. Sessions begun again so.
 MAX_CONTRADICTIONS, MAX_DOUBTED_SESSIONS = 3, 2
 UNFIT_RESTS = frozenset({"held_not_laid_down", "not_flat"})  # the item lies still, but not on a side
+LAID_AGAIN = UNFIT_RESTS | {"bias_jumped"}  # a rest is refused, and the item is to be laid down once more
 RESTARTS = frozenset(
     {"bias_jumped", "table_moved", "accelerometer_jumped", "earlier_move_wrong"}
 )  # the readings before and after it contradict each other
@@ -153,7 +154,9 @@ class HandSession:
         self._pauses_before(rest)
         session = self._not_counted.filter_session(self._segmenter.handled)
         now = self._progress = assess_progress(session, self.conditions)
-        wrong = self._doubt_earlier_moves(now) or now.fault_of_last or self._not_closed(now)
+        wrong = (
+            self._doubt_earlier_moves(now) or now.fault_of_last or self._not_closed(now) or self._laid_after_turn(now)
+        )
         read = now.faces[-1] if now.faces else None
         if read is None:
             wrong = wrong or Fault(
@@ -207,6 +210,16 @@ class HandSession:
         if missed_rad is None or abs(missed_rad) <= MAX_CLOSURE_STDS * self.settings.closure_rad:
             return None
         what = f"that turn ended {abs(np.degrees(missed_rad)):.1f}° from where it began"
+        return Fault("turn_not_closed", what, "Lay it against the rule, and turn again")
+
+    def _laid_after_turn(self, now: SessionProgress) -> Fault | None:
+        """Return a fault if the item was laid down again after a whole turn, so that it lies anywhere, else None."""
+        request = self._request
+        if request is None or request.instruction.say != "lay" or request.again not in LAID_AGAIN:
+            return None
+        if not now.moves or not now.moves[-1].turns:
+            return None
+        what = "after that turn it was laid down again, and need not touch the rule as before"
         return Fault("turn_not_closed", what, "Lay it against the rule, and turn again")
 
     def _next(self, now: SessionProgress, face: Face | None) -> Instruction | None:

@@ -8,6 +8,7 @@ import pytest
 
 from rig.data.recording.hand_events import HandAsked, HandBegunAnew
 from rig.errors import Fault
+from rig.world.hand.habits import Mistake
 from support.laboratories.hand_session_laboratory import LIST, TRUE_SCALE, Table
 
 pytestmark = pytest.mark.slow
@@ -71,6 +72,17 @@ def test_a_mistake_is_asked_again_by_its_name_and_mended(mistakes: Mapping[str, 
     why = " ".join(event.why for event in table.events if isinstance(event, HandAsked))
     assert "touches the rule." in why or "the rig asks for the move again." in why
     assert "--no-closure" not in why
+    held(table)
+
+
+def test_a_turn_after_which_it_was_laid_down_again_is_asked_again() -> None:
+    """Who wipes a crumb away lays it down anywhere, and no longer against the rule."""
+    table = Table(seed=1, in_turn=Mistake("crumb", 15.0), settings=SHORT)
+    table.sit()
+    assert table.again == ["not_flat", "turn_not_closed"]
+    why = " ".join(event.why for event in table.events if isinstance(event, HandAsked))
+    assert "after that turn it was laid down again, and need not touch the rule as before" in why
+    assert [each.turns for each in table.accepted if each.kind == "turn"] == [1, 1]
     held(table)
 
 

@@ -26,6 +26,7 @@ from rig.observation.by_hand.rests_and_moves import NotCounted, range_of, readin
 from rig.observation.clocks.time_base import NOMINAL_DRIFT
 from rig.runner.acquisition import Acquisition
 from rig.runner.by_hand.hand_session import HandSession
+from rig.world.hand.habits import Mistake
 from rig.world.operator import SimulatedOperator
 
 RATE_HZ, LOOK_S, LONGEST_S = 119.0, 0.2, 400.0
@@ -44,13 +45,17 @@ LIST = HandSettings(flips=12, turns=3, rest_s=1.0, box_rad=float(np.radians(0.2)
 
 @dataclass
 class Table:
-    """A session: its `events` in their order. In the rest number `creeps` the item turns slowly."""
+    """A session: its `events` in their order.
+
+    The operator makes the mistake `in_turn` in the first turn. In the rest number `creeps` the item turns slowly.
+    """
 
     seed: int
     mistakes: dict[str, float] = field(default_factory=dict)
     settings: HandSettings = LIST
     hand: dict[str, Any] = field(default_factory=dict)
     creeps: int | None = None
+    in_turn: Mistake | None = None
     events: list[HandEvent] = field(default_factory=list)
     time_s: float = 0.0
 
@@ -108,7 +113,9 @@ class Table:
         self.events.append(event)
         if isinstance(event, HandAsked):
             instruction = event.instruction
-            self.operator.instruct(instruction.say, instruction.face, instruction.turns, again=event.again is not None)
+            mistake, again = (self.in_turn if instruction.say == "turn" else None), event.again is not None
+            self.operator.instruct(instruction.say, instruction.face, instruction.turns, again=again, mistake=mistake)
+            self.in_turn = None if instruction.say == "turn" else self.in_turn
 
     def _pass(self, _: float) -> None:
         """Let time pass, in which readings arrive."""
