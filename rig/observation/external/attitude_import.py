@@ -231,15 +231,16 @@ class _ReferenceRows:
 def select_reports(rows: Mapping[str, Array]) -> tuple[dict[str, Array], NDArray[np.intp], tuple[Omitted, ...]]:
     """Return the attitudes that the reference reported, their numbers in the file, from 1, and what is left out.
 
-    Left out are rows of zero length at the time of a longer row, rows of four zeros, rows that were interpolated
-    between reports, and a few others whose quaternions are no unit quaternions.
+    Left out are rows of zero length whose time a longer one has, rows of four zeros or without numbers, rows that were
+    interpolated between reports, and a few others whose quaternions are no unit quaternions.
     """
     quaternions = np.column_stack([rows[name] for name in QUATERNION])
-    lengths = np.linalg.norm(quaternions, axis=1)
+    with np.errstate(over="ignore"):  # of numbers that are no quaternion's
+        lengths = np.linalg.norm(quaternions, axis=1)
     middles_s = (rows["start_s"] + rows["end_s"]) / 2
     lasting = rows["end_s"] != rows["start_s"]
     repeated = ~lasting & np.isin(middles_s, middles_s[lasting])
-    absent = ~repeated & (lengths == 0)
+    absent = ~repeated & ~((lengths > 0) & (lengths < np.inf))
     kept = ~repeated & ~absent
     interpolated = np.zeros(len(kept), dtype=np.bool_)
     interpolated[kept] = find_interpolated(middles_s[kept], quaternions[kept])
@@ -251,7 +252,7 @@ def select_reports(rows: Mapping[str, Array]) -> tuple[dict[str, Array], NDArray
         Omitted("rows", int(left_out.sum()), len(left_out), reason, f"row {1 + int(np.argmax(left_out))}")
         for left_out, reason in (
             (repeated, "they repeat the time of another attitude"),
-            (absent, "their quaternions are zero: the reference had no attitude"),
+            (absent, "their quaternions are zero or no numbers: the reference had no attitude"),
             (interpolated, "they are interpolated between the attitudes that the reference reported"),
             (wrong, "their quaternions are not of unit length"),
         )

@@ -85,3 +85,15 @@ def test_what_is_left_out_has_its_reason_and_its_first_row() -> None:
     assert len(numbers) + omitted.count == omitted.total == len(rows_s) and omitted.count > 0.5 * (~reported).sum()
     assert "interpolated between the attitudes that the reference reported" in str(omitted)
     assert omitted.first == f"row {min(set(range(1, len(rows_s) + 1)) - set(numbers.tolist()))}"
+
+
+@pytest.mark.parametrize("number", [np.nan, np.inf, 1e200, 0.0])
+def test_rows_whose_quaternions_are_no_numbers_are_left_out(number: float) -> None:
+    quaternions = Rotation.from_rotvec(np.outer(np.linspace(0, 3, 50), [0.6, 0.0, 0.8])).as_quat(scalar_first=True)
+    quaternions[[7, 30]] = number
+    time_s = np.arange(50) / 25
+    columns = {"start_s": time_s - 1e-3, "end_s": time_s + 1e-3}
+    columns |= dict(zip(("qw", "qx", "qy", "qz"), quaternions.T, strict=True))
+    _, numbers, (omitted,) = select_reports(columns)
+    assert numbers.tolist() == [row for row in range(1, 51) if row not in (8, 31)]
+    assert (omitted.count, omitted.first) == (2, "row 8") and "no numbers" in omitted.reason
