@@ -5,7 +5,7 @@ the room. The reader runs in a process of its own (`rig.observation.formats.samp
 bag at a time.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
@@ -164,7 +164,8 @@ def _read_messages(reader: Any, connections: Any) -> Iterator[tuple[float, Any]]
     """Yield each message with the time in its header, in seconds from the beginning of the bag.
 
     All topics have the same beginning. Times count from it because a float of seconds since 1970 would lose
-    microseconds. Raise Refused `bag_topic`.
+    microseconds. Raise Refused `bag_topic` if there is no message, if no header has a time, or if the messages are of
+    several frames.
     """
     from rosbags.typesys import Stores, get_typestore
 
@@ -172,16 +173,37 @@ def _read_messages(reader: Any, connections: Any) -> Iterator[tuple[float, Any]]
     store = get_typestore(Stores.ROS1_NOETIC if is_ros_1 else Stores.ROS2_JAZZY)
     _check_layout(store, connections)
     deserialize = store.deserialize_ros1 if is_ros_1 else store.deserialize_cdr
-    began_ns, count = int(reader.start_time), 0
+    began_ns, topic = int(reader.start_time), quote(connections[0].topic)
+    count, has_times, frames = 0, False, set[tuple[str, ...]]()
     for connection, _, data in reader.messages(connections=connections):
         message: Any = deserialize(data, connection.msgtype)
+        frames.add(_frames(message))
+        if len(frames) > 1:
+            raise _several_frames(topic, frames)
         stamp = message.header.stamp
+        has_times = has_times or bool(stamp.sec or stamp.nanosec)
         yield (int(stamp.sec) * NANO + int(stamp.nanosec) - began_ns) / NANO, message
         count += 1
     if not count:
-        raise Refused(
-            "bag_topic", f"{quote(connections[0].topic)} has no message in the bag", "Name another topic: BAG::/topic"
-        )
+        raise Refused("bag_topic", f"{topic} has no message in the bag", "Name another topic: BAG::/topic")
+    if not has_times:
+        what = f"the messages of {topic} have no time: the stamps in their headers are zero"
+        raise Refused("bag_topic", what, "Let the sensor's driver fill in the header's stamp, and record again")
+
+
+def _frames(message: Any) -> tuple[str, ...]:
+    """Return the names of the frames in a message: that of its sensor or room and, of a transform, the body's."""
+    return (message.header.frame_id, *([message.child_frame_id] if hasattr(message, "child_frame_id") else []))
+
+
+def _several_frames(topic: str, frames: Iterable[tuple[str, ...]]) -> Refused:
+    """Return the refusal of a topic whose messages are of several sensors or bodies."""
+    names = " and ".join(sorted(" to ".join(map(quote, frame)) for frame in frames))
+    return Refused(
+        "bag_topic",
+        f"the messages of {topic} are of several sensors or bodies, by their frames: {names}",
+        "Give a bag in which a topic of its own holds the messages of the frame that is meant",
+    )
 
 
 def _check_layout(store: Any, connections: Any) -> None:

@@ -71,7 +71,7 @@ def whole(path: Path) -> Path:
 
 @dataclass(frozen=True, slots=True)
 class FormatColumns:
-    """The `columns` (n,) of a file, ordered by time; `others`: the number of rows without readings.
+    """The `columns` (n,) of a file, in its order; `others`: the number of rows without readings.
 
     `note`: what the readings lack, in words; "" if nothing is missing.
     """
@@ -106,6 +106,8 @@ def attitudes_in(path: Path) -> Columns | None:
             f"{path} contains readings of sensors, but not their attitudes",
             "Give the attitudes as CSV, or as poses in a ROS 2 bag",
         )
+    order = np.argsort(columns[TIME], kind="stable")
+    columns = {name: column[order] for name, column in columns.items()}
     time_s = columns.pop(TIME)
     return {**rows_around(time_s, path), **columns}
 
@@ -142,7 +144,7 @@ def entry_of(path: Path) -> FileEntry:
 
 
 def _read(form: Format, reader: str, path: Path) -> FormatColumns:
-    """Return the columns, ordered by time. Raise Refused as `readings_in` does."""
+    """Return the columns. Raise Refused as `readings_in` does."""
     source = form.reads(whole(path))
     parts = parts_read_apart(
         reader,
@@ -151,12 +153,7 @@ def _read(form: Format, reader: str, path: Path) -> FormatColumns:
         else_=f"is not a {form.name} that can be read",
         remedy=form.remedy,
     )
-    columns = columns_of(parts)
-    time_s = columns[TIME]
-    if (np.diff(time_s) < 0).any():
-        order = np.argsort(time_s, kind="stable")
-        columns = {name: column[order] for name, column in columns.items()}
-    return FormatColumns(columns, count_omitted_rows(parts), note_of(parts))
+    return FormatColumns(columns_of(parts), count_omitted_rows(parts), note_of(parts))
 
 
 def _format(path: Path) -> Format | None:

@@ -2,17 +2,20 @@
 
 The readings are those of one instance of `sensor_gyro` and one of `sensor_accel`, in rad/s and m/s²; `timestamp_sample`
 is the autopilot's time of the sample in µs. If gyroscope and accelerometer are separate chips, the accelerometer's
-readings are interpolated to the gyroscope's times; if they are one chip, both have the same times.
+readings are interpolated to the gyroscope's times; if they are one chip, both have the same times. Where the
+accelerometer has a gap there is no row; if it has no reading for most rows, the gyroscope is read alone.
 
 PX4's default profile logs these topics once a second or not at all. Then `sensor_combined`, at about 200 Hz, is read,
 with a note on its shortcomings. The reader runs in a process of its own (`rig.observation.formats.sample_files`).
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig.data.processes.reading_parts import Part
 from rig.data.quantity import ACCELERATION, RATE, Quantity
@@ -21,18 +24,29 @@ from rig.errors import Refused
 from rig.errors.extras import missing_extra
 from rig.errors.quoting import list_first, shorten
 from rig.estimation.arrays import Array
-from rig.observation.formats.table_parts import NOTE
+from rig.observation.formats.table_parts import LEFT_OUT, NOTE
 
 SUFFIX = ".ulg"
 TOPICS: dict[str, Quantity] = {"sensor_gyro": RATE, "sensor_accel": ACCELERATION}
 COMBINED_TOPIC = "sensor_combined"
 COMBINED_FIELDS = {RATE: "gyro_rad", ACCELERATION: "accelerometer_m_s2"}
+MAX_STEP_RATIO = 3.0  # of two readings between which others are interpolated to the usual step; beyond, it is a gap
+MIN_COVERED_FRACTION = 0.5  # of the gyroscope's readings, for which there are accelerations
 MIN_RATE_RATIO = 0.5  # to `sensor_combined`: a raw topic with a lower rate lacks some of the readings
 COMBINED_NOTE = (
     "sensor_combined of PX4: the selected sensor, which may change in flight, averaged, and corrected by the "
     "autopilot's own calibration (CAL_GYRO, CAL_ACC): the result is relative to that"
 )
 MICROSECOND_S = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class LogReadings:
+    """The `columns` (n,) of a log by name, the number of rows `left_out`, and a `note` on what the readings lack."""
+
+    columns: dict[str, Array]
+    left_out: int = 0
+    note: str = ""
 
 
 def is_ulog(path: Path) -> bool:
@@ -53,11 +67,11 @@ def ulog_readings(path: Path, inside: str | None = None) -> Iterator[Part]:
         log = ULog(file, [*TOPICS, COMBINED_TOPIC])
     topics = {(topic.name, topic.multi_id): topic.data for topic in log.data_list}
     if _is_combined(path, topics, inside):
-        columns, note = _read_combined(topics[COMBINED_TOPIC, 0]), COMBINED_NOTE
+        readings = _read_combined(topics[COMBINED_TOPIC, 0])
     else:
-        columns, note = _read_raw(topics, int(inside or "0")), ""
-    yield np.column_stack(list(columns.values()))
-    yield {"columns": list(columns), NOTE: note}
+        readings = _read_raw(topics, int(inside or "0"))
+    yield np.column_stack(list(readings.columns.values()))
+    yield {"columns": list(readings.columns), LEFT_OUT: readings.left_out, NOTE: readings.note}
 
 
 def _is_combined(path: Path, topics: Mapping[tuple[str, int], Any], inside: str | None) -> bool:
@@ -72,7 +86,7 @@ def _is_combined(path: Path, topics: Mapping[tuple[str, int], Any], inside: str 
     is_better = combined_hz is not None and (raw_hz is None or raw_hz < MIN_RATE_RATIO * combined_hz)
     if combined_hz is not None and (inside == COMBINED_TOPIC or (inside is None and is_better)):
         return True
-    if raw_hz is None:
+    if raw_hz is None and not (number.isdecimal() and ("sensor_accel", int(number)) in rates_hz):
         logged = [f"{name} {instance} at {rate_hz:.3g} Hz" for (name, instance), rate_hz in sorted(rates_hz.items())]
         wanted = COMBINED_TOPIC if inside == COMBINED_TOPIC else f"sensor_gyro {shorten(number)}"
         raise Refused(
@@ -89,30 +103,67 @@ def _rate_hz(data: Any) -> float:
     return float((len(time_us) - 1) / (span_us * MICROSECOND_S)) if span_us > 0 else 0.0
 
 
-def _read_raw(topics: Mapping[tuple[str, int], Any], instance: int) -> dict[str, Array]:
-    time_us, rates = _read_topic("sensor_gyro", topics["sensor_gyro", instance])
-    columns = {TIME: (time_us - time_us[0]) * MICROSECOND_S, **dict(zip(RATE.columns, rates.T, strict=True))}
-    if ("sensor_accel", instance) in topics:
-        other_us, forces = _read_topic("sensor_accel", topics["sensor_accel", instance])
-        accelerations = [np.interp(time_us, other_us, topic) for topic in forces.T]
-        columns |= dict(zip(ACCELERATION.columns, accelerations, strict=True))
-    return columns
+def _read_raw(topics: Mapping[tuple[str, int], Any], instance: int) -> LogReadings:
+    """Return the readings of one instance of `sensor_gyro` and `sensor_accel`, or of the one that is logged."""
+    read = {
+        quantity: _read_topic(f"{topic} {instance}", topics[topic, instance])
+        for topic, quantity in TOPICS.items()
+        if (topic, instance) in topics
+    }
+    if RATE not in read:
+        return LogReadings(_columns(*read[ACCELERATION], ACCELERATION), note=f"the log holds no sensor_gyro {instance}")
+    time_us, rates = read[RATE]
+    columns = _columns(time_us, rates, RATE)
+    if ACCELERATION not in read:
+        return LogReadings(columns)
+    accelerations, covered = _interpolate(time_us, *read[ACCELERATION])
+    if covered.mean() < MIN_COVERED_FRACTION:
+        note = f"sensor_accel {instance} has readings at {covered.mean():.0%} of the times of sensor_gyro {instance}"
+        return LogReadings(columns, note=f"{note}: it is not read")
+    columns |= dict(zip(ACCELERATION.columns, accelerations.T, strict=True))
+    return LogReadings({name: column[covered] for name, column in columns.items()}, int((~covered).sum()))
 
 
-def _read_combined(data: Any) -> dict[str, Array]:
-    """Return the columns of `sensor_combined`. Raise ValueError if it lacks a field."""
+def _interpolate(time_us: Array, other_us: Array, readings: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Return readings (m, 3) at `other_us` (m,), interpolated to `time_us` (n,), and which of these (n,) they cover.
+
+    A time is covered between two readings without a gap, and as far from the first or last one as readings usually are.
+    """
+    other_us, order = np.unique(other_us, return_index=True)
+    steps_us = np.diff(other_us)
+    usual_us = float(np.median(steps_us)) if len(steps_us) else 0.0
+    near = (time_us >= other_us[0] - usual_us) & (time_us <= other_us[-1] + usual_us)
+    around_us = np.concatenate([[0.0], steps_us, [0.0]])  # the steps before and after each reading
+    least_us = np.min([around_us[np.searchsorted(other_us, time_us, side)] for side in ("left", "right")], axis=0)
+    covered = near & (least_us <= MAX_STEP_RATIO * usual_us)
+    return np.column_stack([np.interp(time_us, other_us, axis) for axis in readings[order].T]), covered
+
+
+def _read_combined(data: Any) -> LogReadings:
+    """Return the readings of `sensor_combined`. Raise ValueError if it lacks a field."""
     fields = [f"{field}[{axis}]" for field in COMBINED_FIELDS.values() for axis in range(3)]
-    time_us, readings = _read_topic(COMBINED_TOPIC, data, fields)
-    names = [name for quantity in COMBINED_FIELDS for name in quantity.columns]
+    return LogReadings(_columns(*_read_topic(COMBINED_TOPIC, data, fields), *COMBINED_FIELDS), note=COMBINED_NOTE)
+
+
+def _columns(time_us: Array, readings: Array, *quantities: Quantity) -> dict[str, Array]:
+    """Return the columns of a table: times since the first row, s, and readings (n, 3) of each quantity."""
+    names = [name for quantity in quantities for name in quantity.columns]
     return {TIME: (time_us - time_us[0]) * MICROSECOND_S, **dict(zip(names, readings.T, strict=True))}
 
 
 def _read_topic(topic: str, data: Any, fields: Sequence[str] = tuple("xyz")) -> tuple[Array, Array]:
-    """Return times (n,) in µs, increasing, and readings (n, k). Raise ValueError if the topic lacks a field."""
-    stamp = "timestamp_sample" if "timestamp_sample" in data else "timestamp"
+    """Return times (n,) in µs and readings (n, k) in the order of the log.
+
+    Raise Refused `ulog_topic` for readings of several sensors, ValueError if the topic lacks a field.
+    """
+    stamp = "timestamp_sample" if np.any(data.get("timestamp_sample", 0)) else "timestamp"
     if missing := [name for name in (stamp, *fields) if name not in data]:
         raise ValueError(f"its {topic} has no {' and no '.join(missing)}")
+    if len(sensors := np.unique(data.get("device_id", 0))) > 1:
+        raise Refused(
+            "ulog_topic",
+            f"{topic} holds readings of {len(sensors)} sensors: device_id {list_first(map(str, sensors))}",
+            "Give a log of a flight in which the sensor did not change, or name another instance: LOG.ulg::1",
+        )
     time_us = np.asarray(data[stamp], dtype=np.int64)
-    readings = np.column_stack([np.asarray(data[axis], dtype=np.float64) for axis in fields])
-    order = np.unique(time_us, return_index=True)[1]
-    return time_us[order].astype(np.float64), readings[order]
+    return time_us.astype(np.float64), np.column_stack([np.asarray(data[axis], dtype=np.float64) for axis in fields])

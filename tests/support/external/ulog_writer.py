@@ -15,11 +15,25 @@ COMBINED = (
 )
 
 
-def write_ulog(path: Path, time_us: np.ndarray, rates: np.ndarray, forces: np.ndarray, raw_every: int = 1) -> None:
+def write_ulog(
+    path: Path,
+    time_us: np.ndarray,
+    rates: np.ndarray,
+    forces: np.ndarray,
+    raw_every: int = 1,
+    *,
+    rates_at: np.ndarray | None = None,
+    forces_at: np.ndarray | None = None,
+    devices: np.ndarray | None = None,
+    sampled_us: int | None = None,
+) -> None:
     """Write a log of one IMU, with readings (n, 3) rad/s and m/s² at times (n,) in µs.
 
-    With `raw_every` > 1 the raw topics hold every `raw_every`-th reading, and `sensor_combined` all.
+    With `raw_every` > 1 the raw topics hold every `raw_every`-th reading, and `sensor_combined` all. `rates_at` and
+    `forces_at` are the rows that each sensor has, all by default; `devices` (n,) the sensors' identities; `sampled_us`
+    stands for the time of every sample in the raw topics.
     """
+    rows_of = [None if at is None else {*at.tolist()} for at in (rates_at, forces_at)]
     with path.open("wb") as file:
         file.write(b"ULog\x01\x12\x35\x01" + pack("<Q", int(time_us[0])))
 
@@ -33,7 +47,8 @@ def write_ulog(path: Path, time_us: np.ndarray, rates: np.ndarray, forces: np.nd
         if raw_every > 1:
             message(b"A", pack("<BH", 0, len(FORMATS)) + b"sensor_combined")
         for number, name in enumerate(FORMATS):
-            message(b"A", pack("<BH", 0, number) + name.encode())
+            if rows_of[number] != set():
+                message(b"A", pack("<BH", 0, number) + name.encode())
         for row, (stamp_us, rate, force) in enumerate(
             zip(time_us.tolist(), rates.tolist(), forces.tolist(), strict=True)
         ):
@@ -41,5 +56,8 @@ def write_ulog(path: Path, time_us: np.ndarray, rates: np.ndarray, forces: np.nd
                 message(b"D", pack("<HQ3fIi3fI", len(FORMATS), stamp_us, *rate, 5000, 0, *force, 5000))
             if row % raw_every:
                 continue
+            device = 1234 if devices is None else int(devices[row])
             for number, reading in enumerate((rate, force)):
-                message(b"D", pack("<HQQI4f", number, stamp_us + 300, stamp_us, 1234, *reading, 25.0))
+                of_sample_us = stamp_us if sampled_us is None else sampled_us
+                if (rows := rows_of[number]) is None or row in rows:
+                    message(b"D", pack("<HQQI4f", number, stamp_us + 300, of_sample_us, device, *reading, 25.0))
