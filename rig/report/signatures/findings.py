@@ -89,11 +89,11 @@ def list_signer_doubts(name: str, report: SignatureReport, why: str) -> list[Ref
     return [Refused("signer_not_trusted", what, remedy)] if why else []
 
 
-def stamp_not_trusted(name: str, server: str) -> Refused:
-    """Return the problem of a file whose time stamp is from an unknown server."""
+def stamp_not_trusted(name: str, server: str, why: str) -> Refused:
+    """Return the problem of a file whose time stamp is not trusted, and `why`; "" for an unknown server."""
     return Refused(
         "signer_not_trusted",
-        f"{name} has a time stamp by {server}, which is not trusted",
+        f"{name} has a time stamp by {server}, which is not trusted{why and f': {why}'}",
         "Give the certificate of the time server, or of the authority that issued it, with --trust too",
     )
 

@@ -9,7 +9,6 @@ from typing import Any
 
 from asn1crypto import parser
 from asn1crypto.crl import CertificateList
-from asn1crypto.x509 import Certificate
 from cryptography.x509 import load_der_x509_certificate
 from pyhanko.pdf_utils.reader import PdfFileReader
 from pyhanko.sign.fields import SigSeedSubFilter
@@ -28,7 +27,7 @@ from rig.report.signatures.findings import (
     stamp_not_trusted,
 )
 from rig.report.signatures.reason import Reason
-from rig.report.signatures.trust import Trust, find_unvouched, why_untrusted
+from rig.report.signatures.trust import Trust, find_unvouched, trust_anchors, unfit_for_stamps, why_untrusted
 
 
 def inspect_pdf(name: str, content: bytes, trust: Trust) -> FileInspection:
@@ -53,8 +52,7 @@ def inspect_pdf(name: str, content: bytes, trust: Trust) -> FileInspection:
 def _status(signature: Any, trust: Trust) -> Any:
     """Return pyHanko's status of a signature: time servers of `trust` are trusted, and the signer is not judged."""
     no_signers = ValidationContext(trust_roots=[], allow_fetching=False)
-    roots = list(map(Certificate.load, trust.certificates))
-    servers = ValidationContext(trust_roots=roots, allow_fetching=False)
+    servers = ValidationContext(trust_roots=trust_anchors(trust), allow_fetching=False)
     return validate_pdf_signature(signature, no_signers, servers)
 
 
@@ -90,10 +88,13 @@ def _inspect_signature(
     """Return the signature's report, and the problems of its signer and of its time stamp."""
     stamp = status.timestamp_validity
     is_intact = stamp is not None and stamp.intact and stamp.valid
-    stamped = is_intact and stamp.trusted
+    now = datetime.now(UTC)
+    server = load_der_x509_certificate(stamp.signing_cert.dump()) if is_intact else None
+    unfit = "" if server is None else next(unfit_for_stamps(server, stamp.timestamp, now), "")
+    stamped = is_intact and stamp.trusted and not unfit
     chain = [one.dump() for one in (signature.signer_cert, *signature.other_embedded_certs)]
     lists = lists if stamped else ()  # without a trusted time the lists prove nothing
-    moment = stamp.timestamp if stamped else datetime.now(UTC)
+    moment = stamp.timestamp if stamped else now
     why = why_untrusted(chain, trust, moment, lists) if trust.certificates else ""
     report = SignatureReport(
         signer=_name(chain[0]),
@@ -107,7 +108,7 @@ def _inspect_signature(
     )
     doubts = list_signer_doubts(name, report, why)
     if trust.certificates and is_intact and not stamped:
-        doubts.append(stamp_not_trusted(name, _name(stamp.signing_cert.dump())))
+        doubts.append(stamp_not_trusted(name, _name(stamp.signing_cert.dump()), unfit))
     return report, doubts
 
 

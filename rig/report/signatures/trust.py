@@ -3,14 +3,16 @@
 import asyncio
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import datetime, timedelta
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from asn1crypto.crl import CertificateList
     from cryptography.x509 import Certificate
+    from pyhanko_certvalidator.authority import CertTrustAnchor
 
 RSA_MIN_BITS, EC_MIN_BITS = 2048, 256  # ETSI TS 119 312, clause 6.2: recommended today
+MAX_CLOCK_ERROR = timedelta(days=1)  # of this computer, or in its time zone
 DOCUMENT_PURPOSES = {
     "1.3.6.1.5.5.7.3.36": "documents (RFC 9336)",
     "1.3.6.1.4.1.311.10.3.12": "documents (Microsoft)",
@@ -34,7 +36,8 @@ def why_untrusted(
     """Return why the signer, whose certificate begins this `chain` (DER), is not trusted; empty if trusted.
 
     The certificate must be valid at the `moment`, have a chain to a trusted certificate, be intended for signing
-    documents, and have the expected name. Revocation `lists`, if given, must cover the whole chain.
+    documents, and have the expected name. Its authorities must be authorities whose certificates allow this. Revocation
+    `lists`, if given, must cover the whole chain.
     """
     from cryptography.x509 import load_der_x509_certificate
 
@@ -47,15 +50,37 @@ def why_untrusted(
     )
 
 
+def trust_anchors(trust: Trust) -> "list[CertTrustAnchor]":
+    """Return the trusted certificates with their own limits: path length, name constraints (RFC 5937) and last day."""
+    from asn1crypto.x509 import Certificate
+    from pyhanko_certvalidator.authority import CertTrustAnchor, TrustQualifiers, derive_quals_from_cert
+    from pyhanko_certvalidator.policy_decl import PKIXValidationParams
+
+    anchors = []
+    for certificate in map(Certificate.load, trust.certificates):
+        limits = derive_quals_from_cert(certificate)
+        names = limits.standard_parameters or PKIXValidationParams()
+        names = PKIXValidationParams(  # without its policies, which the certificates below need not state
+            initial_permitted_subtrees=names.initial_permitted_subtrees,
+            initial_excluded_subtrees=names.initial_excluded_subtrees,
+        )
+        length = limits.max_path_length  # pyHanko needs it twice, also for attribute certificates
+        anchors.append(
+            CertTrustAnchor(certificate, TrustQualifiers(names, length, length, valid_until=limits.valid_until))
+        )
+    return anchors
+
+
 def _no_path(chain: Sequence[bytes], trust: Trust, moment: datetime, lists: "Sequence[CertificateList]") -> str:
     """Return why the certificate does not lead to a trusted one at the time `moment`; empty if it does."""
     from asn1crypto.x509 import Certificate
+    from cryptography.x509 import load_der_x509_certificate
     from pyhanko_certvalidator import CertificateValidator, ValidationContext
     from pyhanko_certvalidator.errors import PathError, ValidationError
 
     certificate, *others = map(Certificate.load, chain)
     context = ValidationContext(
-        trust_roots=list(map(Certificate.load, trust.certificates)),
+        trust_roots=trust_anchors(trust),
         other_certs=others,
         moment=moment,
         crls=list(lists),
@@ -63,10 +88,28 @@ def _no_path(chain: Sequence[bytes], trust: Trust, moment: datetime, lists: "Seq
         allow_fetching=False,
     )
     try:
-        asyncio.run(CertificateValidator(certificate, validation_context=context).async_validate_usage(set()))
+        validator = CertificateValidator(certificate, validation_context=context)
+        path = asyncio.run(validator.async_validate_usage(set()))
     except (PathError, ValidationError) as error:
         return " ".join(str(error).split())
-    return ""
+    authorities = [load_der_x509_certificate(one.dump()) for one in path.iter_certs(include_root=True)][:-1]
+    if not authorities and chain[0] not in trust.certificates:
+        return "another certificate of the same name and key is the trusted one"
+    return next((why for authority in authorities for why in _unfit_authority(authority)), "")
+
+
+def _unfit_authority(certificate: "Certificate") -> Iterator[str]:
+    """Yield reasons why an authority of this certificate vouches for no signer of documents."""
+    from cryptography.x509 import BasicConstraints, ExtensionNotFound
+
+    name = certificate.subject.rfc4514_string()
+    try:
+        is_authority = certificate.extensions.get_extension_for_class(BasicConstraints).value.ca
+    except ExtensionNotFound:
+        is_authority = False
+    if not is_authority:
+        yield f"it was issued by {name}, who is no authority"
+    yield from (f"its authority {name}: the {why}" for why in (*_other_purposes(certificate), *_weak_key(certificate)))
 
 
 def unfit_for_documents(certificate: "Certificate") -> Iterator[str]:
@@ -75,29 +118,59 @@ def unfit_for_documents(certificate: "Certificate") -> Iterator[str]:
     A certificate without key usage is not accepted, although RFC 5280 (4.2.1.3) permits it all usages, because
     certificates of web servers from small authorities often state no key usage.
     """
-    from cryptography.hazmat.primitives.asymmetric.ec import EllipticCurvePublicKey
-    from cryptography.hazmat.primitives.asymmetric.rsa import RSAPublicKey
-    from cryptography.x509 import ExtendedKeyUsage, ExtensionNotFound, KeyUsage
+    from cryptography.x509 import ExtensionNotFound, KeyUsage
 
-    extensions = certificate.extensions
     try:
-        usage = extensions.get_extension_for_class(KeyUsage).value
+        usage = certificate.extensions.get_extension_for_class(KeyUsage).value
         signs = usage.digital_signature or usage.content_commitment
     except ExtensionNotFound:
         signs = False
     if not signs:
         yield "its certificate is not made for signing documents: the key usage is not digitalSignature"
+    yield from (f"its {why}" for why in (*_other_purposes(certificate), *_weak_key(certificate)))
+
+
+def _other_purposes(certificate: "Certificate") -> Iterator[str]:
+    """Yield the purposes of a certificate, if it states them (extended key usage) and documents are not among them."""
+    from cryptography.x509 import ExtendedKeyUsage, ExtensionNotFound
+
     try:
-        purposes = [purpose.dotted_string for purpose in extensions.get_extension_for_class(ExtendedKeyUsage).value]
+        stated = certificate.extensions.get_extension_for_class(ExtendedKeyUsage).value
     except ExtensionNotFound:
-        purposes = list(DOCUMENT_PURPOSES)
+        return
+    purposes = [purpose.dotted_string for purpose in stated]
     if not DOCUMENT_PURPOSES.keys() & purposes:
-        yield f"its certificate is not made for signing documents: its extended key usage is {', '.join(purposes)}"
+        yield f"certificate is not made for signing documents: its extended key usage is {', '.join(purposes)}"
+
+
+def _weak_key(certificate: "Certificate") -> Iterator[str]:
+    """Yield the fault of a certificate's key, if it is too short or neither RSA nor EC."""
+    from cryptography.hazmat.primitives.asymmetric.ec import EllipticCurvePublicKey
+    from cryptography.hazmat.primitives.asymmetric.rsa import RSAPublicKey
+
     key = certificate.public_key()
     if not isinstance(key, RSAPublicKey | EllipticCurvePublicKey):
-        yield "its key is neither RSA nor EC"
+        yield "key is neither RSA nor EC"
     elif key.key_size < (RSA_MIN_BITS if isinstance(key, RSAPublicKey) else EC_MIN_BITS):
-        yield f"its key is weak: it has {key.key_size} bits"
+        yield f"key is weak: it has {key.key_size} bits"
+
+
+def unfit_for_stamps(certificate: "Certificate", moment: datetime, now: datetime) -> Iterator[str]:
+    """Yield reasons why a time server of this certificate could not stamp at the time `moment` (RFC 3161, 2.3)."""
+    from cryptography.x509 import ExtendedKeyUsage, ExtensionNotFound
+    from cryptography.x509.oid import ExtendedKeyUsageOID
+
+    try:
+        extension = certificate.extensions.get_extension_for_class(ExtendedKeyUsage)
+        is_alone = [*extension.value] == [ExtendedKeyUsageOID.TIME_STAMPING] and extension.critical
+    except ExtensionNotFound:
+        is_alone = False
+    if not is_alone:
+        yield "its certificate is not made for time stamps alone"
+    if not certificate.not_valid_before_utc <= moment <= certificate.not_valid_after_utc:
+        yield f"its certificate was not valid on {moment:%Y-%m-%d}"
+    if moment > now + MAX_CLOCK_ERROR:
+        yield f"it is of {moment:%Y-%m-%d}, which is to come"
 
 
 def _other_name(certificate: "Certificate", expected: str | None) -> str:

@@ -34,6 +34,8 @@ def read_xml(content: bytes) -> Any:
     """
     codec, names = _ENCODINGS.get(content[:2], _UTF_8)
     text = content.decode(codec)
+    if text.startswith("\ufeff"):
+        raise ValueError("it has two marks of the byte order")
     declaration = _DECLARATION.match(text)
     if declaration is not None:
         encoding = declaration["encoding"]

@@ -106,6 +106,7 @@ OF_FORM: dict[str, Forgery] = {
     "another version of XML": declare('<?xml version="1.1" encoding="UTF-8"?>', "utf-8"),
     "another encoding": declare('<?xml version="1.0" encoding="ISO-8859-1"?>', "latin-1"),
     "an encoding that it is not in": declare('<?xml version="1.0" encoding="UTF-16"?>', "utf-8"),
+    "two marks of the byte order": lambda content: b"\xef\xbb\xbf" * 2 + content,
     "UTF-7": declare('<?xml version="1.0" encoding="UTF-7"?>', "utf-7"),
 }
 # What stands in the signature, or where it stands.

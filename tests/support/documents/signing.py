@@ -68,24 +68,31 @@ def issue(
     days: tuple[int, int] = (-1, 30),
     usage: Sequence[str] | None = None,
     purposes: Sequence[x509.ObjectIdentifier] = (),
+    is_authority: bool | None = None,
+    path_length: int | None = None,
+    names: x509.NameConstraints | None = None,
+    is_critical: bool = True,
 ) -> Holder:
     """Return the holder of this key, whose certificate has this key usage and these purposes (extended key usage).
 
-    The default `usage` is that of a document's signer or, without an issuer, of an authority; an empty one is omitted.
+    By default those without an issuer are authorities. The default `usage` is that of a document's signer or of an
+    authority; an empty one is omitted. `path_length` and `names` are limits; `is_critical`: the purposes.
     """
     subject = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, name)])
     issuer = subject if above is None else above.chain[0].subject
     begin, end = (datetime.now(UTC) + timedelta(days=day) for day in days)
-    signs = above is not None
+    signs = above is not None if is_authority is None else not is_authority
     if usage is None:
         usage = ("digital_signature", "content_commitment") if signs else ("key_cert_sign", "crl_sign")
     builder = x509.CertificateBuilder(issuer, subject, key.public_key(), x509.random_serial_number(), begin, end)
-    builder = builder.add_extension(x509.BasicConstraints(ca=not signs, path_length=None), critical=True)
+    builder = builder.add_extension(x509.BasicConstraints(ca=not signs, path_length=path_length), critical=True)
     if usage:
         bits = x509.KeyUsage(**{bit: bit in usage for bit in USAGES})
         builder = builder.add_extension(bits, critical=True)
     if purposes:
-        builder = builder.add_extension(x509.ExtendedKeyUsage(purposes), critical=True)
+        builder = builder.add_extension(x509.ExtendedKeyUsage(purposes), critical=is_critical)
+    if names is not None:
+        builder = builder.add_extension(names, critical=True)
     certificate = builder.sign(key if above is None else above.key, hashes.SHA256())
     return Holder(key, (certificate, *(() if above is None else above.chain)))
 
