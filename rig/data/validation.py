@@ -42,7 +42,8 @@ def read_document(kind: type[Document], file: Path, limit_bytes: int, *, what: s
     Raise Refused `no_result`, `not_a_result`.
     """
     try:
-        return kind.model_validate(parse_json(read_regular_file(file, limit_bytes), MAX_VALUES))
+        value = parse_json(read_regular_file(file, limit_bytes), MAX_VALUES)
+        return kind.model_validate_json(json.dumps(value), strict=True)  # of JSON, so that a list may be a tuple
     except (UnfitFile, OSError) as error:
         why = error.strerror if isinstance(error, OSError) else error
         raise Refused("no_result", f"{file} cannot be read: {why}", remedy) from error
@@ -64,16 +65,16 @@ def read_document(kind: type[Document], file: Path, limit_bytes: int, *, what: s
 
 
 def parse_json(content: str | bytes, most: int = MAX_RECORDED_VALUES) -> Any:
-    """Return the value of a JSON text from any source, with its strings made printable.
+    """Return the value of a JSON text (RFC 8259) from any source, with its strings made printable.
 
-    Raise ValueError for a number that no measurement can yield (not finite, or too large), a duplicate key, or more
-    than `most` values. Raise RecursionError for values that are nested too deeply.
+    Raise ValueError for bytes that are not UTF-8, a number that no measurement can yield (not finite, or too large), a
+    duplicate key, or more than `most` values. Raise RecursionError for values that are nested too deeply.
     """
     content = content.encode() if isinstance(content, str) else content
     if sum(map(content.count, SEPARATORS)) > most:
         raise ValueError(f"it holds over {most} values")
     value = json.loads(
-        content,
+        content.decode(),
         parse_float=_parse_number,
         parse_int=_parse_number,
         parse_constant=_parse_number,

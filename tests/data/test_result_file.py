@@ -58,6 +58,22 @@ def test_what_is_missing_or_wrong_is_refused_by_its_place(tmp_path: Path) -> Non
         read_result(tmp_path)
 
 
+@pytest.mark.parametrize("speed", ["0.5", True, [0.5]])
+def test_a_number_is_no_text_and_no_truth_value(speed: object, tmp_path: Path) -> None:
+    document = json.loads(VERIFIED.text())
+    document["gyroscopes"]["gyro"]["observations"][2]["speed_rad_s"] = speed
+    (tmp_path / "result.json").write_text(json.dumps(document), encoding="utf-8")
+    with pytest.raises(Refused, match=r"not_a_result: .*speed_rad_s: Input should be a valid number"):
+        read_result(tmp_path)
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-32", "utf-8-sig"])
+def test_a_result_is_utf_8_without_a_mark_of_the_byte_order(encoding: str, tmp_path: Path) -> None:
+    (tmp_path / "result.json").write_text(VERIFIED.text(), encoding=encoding)
+    with pytest.raises(Refused, match="not_a_result"):
+        read_result(tmp_path)
+
+
 def test_provenance_may_say_more_than_this_version_knows(tmp_path: Path) -> None:
     document = json.loads(VERIFIED.text())
     document["provenance"]["operator"] = {"name": "R. Feynman"}

@@ -42,7 +42,7 @@ AMENDED = StatedFacts(
 # (what stands there, what is planted): each must be refused by the schema or by the rules.
 FAULTS = {
     "an outcome there is no word for": (">pass<", ">passed<"),
-    "a day there is not": ("<dcc:issueDate>2026-11-", "<dcc:issueDate>2026-13-"),
+    "a day there is not": ("<dcc:issueDate>20", "<dcc:issueDate>20-"),
     "a number that is none": ("<si:valueXMLList>1.", "<si:valueXMLList>x1."),
     "an uncertainty below zero": ("<si:uncertaintyXMLList>0", "<si:uncertaintyXMLList>-0"),
     "a probability above one": ("XMLList>0.9545<", "XMLList>1.9545<"),
