@@ -8,9 +8,12 @@ from rig.config.files.regular_file import UnfitFile, read_regular_file
 from rig.errors import Refused
 from rig.errors.extras import requiring
 from rig.report.signatures.findings import FileInspection, not_as_signed, not_signed
+from rig.report.signatures.long_term import LIST_MAX_BYTES
 from rig.report.signatures.signatory import EXTRA, SIZE_MAX_BYTES
 from rig.report.signatures.trust import Trust
 
+XML_MAX_BYTES = 2_000_000  # a sensor takes 35 kB; a crafted document takes 150 times its length of memory
+PDF_MAX_BYTES = 2 * LIST_MAX_BYTES + 4_000_000  # with two revocation lists; without them a sensor takes 105 kB
 HEAD_BYTES = 200  # enough to detect the type of a file
 
 
@@ -19,6 +22,8 @@ def inspect_file(name: str, content: bytes, trust: Trust) -> FileInspection:
     is_pdf = content.startswith(b"%PDF-")
     if not is_pdf and not _is_xml(content):
         return FileInspection(problems=(not_signed(name),))
+    if len(content) > (limit := PDF_MAX_BYTES if is_pdf else XML_MAX_BYTES):
+        return FileInspection(problems=(not_as_signed(name, f"it is longer than {limit} bytes, as no certificate is"),))
     with requiring(EXTRA):
         if is_pdf:
             from rig.report.signatures.pdf_signatures import inspect_pdf as inspect

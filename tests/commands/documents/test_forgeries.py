@@ -12,6 +12,7 @@ from lxml import etree
 from pyhanko.pdf_utils.generic import StreamObject
 from pyhanko.pdf_utils.writer import PageObject, PdfFileWriter
 
+from rig.report.signatures.inspection import PDF_MAX_BYTES, XML_MAX_BYTES
 from rig.report.signatures.reason import Reason
 from rig.report.signatures.signing import sign_as_pades, sign_as_xades
 from support.documents.forged_json import FORGED_JSON, IN_OTHER_BYTES
@@ -99,6 +100,13 @@ def test_a_signed_digital_certificate_is_read_in_every_usual_encoding(
 ) -> None:
     (lab.folder / XML).write_bytes(written(lab.read(XML)))
     assert lab.verified(XML, history=False)[0] == 0
+
+
+@pytest.mark.parametrize(("file", "limit"), [(PDF, PDF_MAX_BYTES), (XML, XML_MAX_BYTES)])
+def test_a_file_that_is_too_long_for_a_certificate_is_not_parsed(file: str, limit: int, lab: Laboratory) -> None:
+    (lab.folder / file).write_bytes(lab.read(file) + b" " * limit)
+    status, said = lab.verified(file, history=False)
+    assert (status, names_of(said)) == (ALTERED, ["not_as_signed"]) and f"longer than {limit} bytes" in said
 
 
 def key() -> ec.EllipticCurvePrivateKey:
