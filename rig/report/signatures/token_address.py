@@ -29,8 +29,9 @@ class TokenKey:
 
 
 def is_token_address(text: str) -> bool:
-    """Return whether the text is meant as the address of a key in a token, not as a file's name."""
-    return _decode(text).strip().startswith(SCHEME)
+    """Return whether the text is meant as the address of a key in a token, or contains a PIN as only one can."""
+    decoded = _decode(text)
+    return decoded.strip().startswith(SCHEME) or _PIN.search(decoded) is not None
 
 
 def token_key(address: str) -> TokenKey:
