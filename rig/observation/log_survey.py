@@ -92,7 +92,7 @@ def _find_turns(time_s: Array, rates: Array, rests: Sequence[Window]) -> Iterato
 def _count_faces(directions: Sequence[Array]) -> int:
     faces: list[Array] = []
     for direction in directions:
-        unit = direction / np.linalg.norm(direction)
-        if all(float(unit @ face) < np.cos(np.pi / 4) for face in faces):
+        unit = direction / (np.linalg.norm(direction) or np.inf)
+        if unit.any() and all(float(unit @ face) < np.cos(np.pi / 4) for face in faces):
             faces.append(unit)
     return len(faces)

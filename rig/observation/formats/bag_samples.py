@@ -6,7 +6,7 @@ bag at a time.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -114,14 +114,19 @@ def _inertial(
 
 @contextmanager
 def _open_bag(path: Path) -> Iterator[Any]:
-    """Open the bag's reader. Raise Refused `missing_extra`."""
+    """Open the bag's reader. Raise Refused `missing_extra`, ValueError for messages that are not ROS's."""
     try:
         from rosbags import rosbag1, rosbag2
     except ImportError as error:
         raise missing_extra(error, "ros2") from error
     if path.is_dir():
         _check_metadata(path / METADATA)
-    with (rosbag1 if _is_ros_1(path) else rosbag2).Reader(str(path)) as reader:
+    reader = (rosbag1 if _is_ros_1(path) else rosbag2).Reader(str(path))
+    try:
+        reader.open()
+    except KeyError as error:  # of the encodings that ROS 2 has
+        raise ValueError(f"a topic has a schema of another kind than ROS's: {error}") from error
+    with closing(reader):
         yield reader
 
 

@@ -18,6 +18,7 @@ from rig.observation.formats.csv_cells import HEADING_MARKS, is_value
 
 MAX_HARMLESS_BYTES = 1_000_000  # some ten thousand rows, which take four times as much memory
 MAX_LINE = 10_000  # characters: enough for a hundred columns, of which there are at most twenty
+ARDUPILOT = b"\xa3\x95"  # the beginning of each message of a DataFlash log
 GZIP, UTF_16 = b"\x1f\x8b", (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 SEPARATORS = ";\t"
 
@@ -77,6 +78,10 @@ def _text(file: BinaryIO | GzipFile) -> TextIOWrapper:
     begin = _read_beginning(file)
     if begin.startswith(UTF_16):
         return TextIOWrapper(file, encoding="utf-16", errors="replace", newline="")
+    if begin.startswith(ARDUPILOT):
+        raise UnfitFile(
+            "it is a log of ArduPilot, whose IMU messages `mavlogdump.py --types IMU --format csv` writes as CSV"
+        )
     if b"\0" in begin:
         raise UnfitFile("it is not text but a spreadsheet, an archive or another program's own file")
     try:

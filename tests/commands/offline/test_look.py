@@ -21,6 +21,7 @@ from rig.report.terminal.look_lines import describe_file
 from support.external.csv_tables import write_table
 from support.external.robot_log import MATRIX, make_log, write_log
 from support.external.turned_body import Hand, turn
+from support.external.ulog_writer import write_ulog
 from support.laboratories.commands import rig_here
 from support.paths import DOCS
 
@@ -382,6 +383,12 @@ def test_a_file_without_numbers_is_refused_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("Dear diary,\ntoday it rained.\n" * 20, encoding="utf-8")
     done = rig_here("look", tmp_path / "notes.txt")
     assert done.returncode == 2 and len(done.stderr.splitlines()) == 1 and "wrong_columns" in done.stderr
+
+
+def test_an_accelerometer_that_reads_zero_has_no_gravity(tmp_path: Path) -> None:
+    rates = np.random.default_rng(1).normal(0, 1e-3, (400, 3))
+    write_ulog(tmp_path / "log.ulg", np.arange(400) * 10_000, rates, np.zeros((400, 3)))
+    assert "gravity in 0 directions" in rig_here("look", tmp_path / "log.ulg").stdout
 
 
 def test_a_file_of_sweeps_is_no_log() -> None:

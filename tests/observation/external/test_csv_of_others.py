@@ -84,6 +84,7 @@ def test_headings_of_a_german_logger_are_found_in_any_encoding(tmp_path: Path, e
         (PLAIN.replace("_s,", "_s,,", 1).encode(), "wrong_columns: .*a column without a name"),
         (PLAIN.encode() + b"3,0\xff\xfe,1,1\n", "not_a_number: .*line 32"),
         (PLAIN.replace("time_s", "Zeit").encode(), "lacks time_s, has the unknown Zeit.* --columns"),
+        (b"\xa3\x95\x80\x80\x59FMT\0", "no_file: .*log.csv cannot be read: it is a log of ArduPilot"),
         (b"PK\x03\x04\0\0\0\0xl/worksheets", "no_file: .*log.csv cannot be read: it is not text but a spreadsheet"),
         (gzip.compress(PLAIN.encode(), mtime=0)[:60], "no_file: .*ended before the end"),
         (gzip.compress(PLAIN.encode(), mtime=0)[:30] + b"\xff" * 60, "no_file: .*log.csv cannot be read"),

@@ -400,3 +400,13 @@ def test_a_log_whose_sensors_state_no_time_of_their_samples_has_the_times_of_its
     readings = np.ones((100, 3))
     write_ulog(tmp_path / "log.ulg", np.arange(100) * 5000, readings, readings, sampled_us=0)
     assert np.diff(read_samples(tmp_path / "log.ulg").time_s) == pytest.approx(np.full(99, 0.005))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("encoding", ["jsonschema", "protobuf"])
+def test_a_bag_whose_messages_are_not_those_of_ros_is_named_so(encoding: str, tmp_path: Path) -> None:
+    path = mcap(tmp_path / "bag")
+    (file,) = path.glob("*.mcap")
+    file.write_bytes(file.read_bytes().replace(b"\x07\0\0\0ros2msg", struct.pack("<I", 7) + encoding[:7].encode()))
+    with pytest.raises(Refused, match=f"no_file: .* a topic has a schema of another kind than ROS's: '{encoding[:7]}'"):
+        read_samples(path)
