@@ -26,6 +26,7 @@ CONTRIBUTOR_SOURCES: Mapping[str, tuple[Literal["A", "B"], str]] = {
     increment_solution.DELAY: ("A", f"estimated, with the jitter of the stamps, {INCLUDED_IN_U}"),
     increment_solution.EARTH_RATE: ("B", "its size, whichever way it points"),
     increment_solution.AXES: ("B", f"inclinations that F imitates, {INCLUDED_IN_U}"),
+    increment_solution.ROUNDING: ("B", "coarse steps of the readings at rest, at most"),
     increment_solution.INTERVAL_DIFFERENCES: ("A", f"change of F and b with attitude and time, {INCLUDED_IN_U}"),
 }
 

@@ -9,7 +9,7 @@ from rig.analysis.external.attitude_budget import budget_by_causes
 from rig.analysis.external.changes import check_steady
 from rig.analysis.external.inverted import solve_unless_inverted
 from rig.analysis.external.rate_ratios import check_rate_ratios
-from rig.analysis.external.rests_agree import check_rests_agree
+from rig.analysis.external.rests_agree import check_rests_agree, include_rounding
 from rig.data.quantity import RATE
 from rig.errors import Fault
 from rig.estimation.arrays import Array, scale_of
@@ -17,6 +17,7 @@ from rig.estimation.external.increment_solution import IncrementSolution, solve_
 from rig.estimation.gyroscope.budget import Budget
 from rig.estimation.refusals import check_axes, check_unit
 from rig.observation.external.fixes import OmittedIncrements, gather
+from rig.observation.external.means_at_rest import means_at_rest
 from rig.observation.external.omission import Omitted
 from rig.observation.external.reference_clock import check_offset
 from rig.observation.external.reference_rows import Turning, select_covered
@@ -90,9 +91,11 @@ def solve_turning(turning: Turning, window_s: float | None, *, any_mounting: boo
     if not any_mounting:
         matrix = solved.solution.matrix
         check_axes(matrix / np.linalg.norm(matrix, axis=1, keepdims=True), np.eye(3))
-    check_rests_agree(turning, solved.solution)
-    check_steady(solved.solution.change, RATE)
-    return solved
+    at_rest = means_at_rest(turning, solved.solution.clock_s)
+    solution = include_rounding(solved.solution, at_rest)
+    check_rests_agree(solution, at_rest)
+    check_steady(solution.change, RATE)
+    return replace(solved, solution=solution)
 
 
 def _solve(turning: Turning, window_s: float | None) -> IncrementCalibration:

@@ -5,32 +5,46 @@ follows from the scatter of the reference's rates in the rests. The reference's 
 used, because time stamps may cause them.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from rig.data.quantity import RATE
 from rig.errors import Fault
 from rig.estimation.arrays import Array
 from rig.estimation.earth import EARTH_RATE_RAD_S
-from rig.estimation.external.increment_solution import IncrementSolution
+from rig.estimation.external.increment_solution import ROUNDING, IncrementSolution
 from rig.estimation.reference.reference_model import BIAS
 from rig.estimation.statistics.coverage import false_alarm_of_each
-from rig.observation.external.means_at_rest import means_at_rest
-from rig.observation.external.reference_rows import Turning
+from rig.observation.external.means_at_rest import MeansAtRest
 
 FALSE_ALARM_PROBABILITY = 1e-3  # for the worst of three axes, if the recording's bias is that at rest
 G_SENSITIVITY_RAD_S = 1e-3  # effect of 1 g on a MEMS gyroscope, which rests in one attitude and moves through many
+MIN_ROUNDING = 1e-3  # of the variance of the bias; less does not matter
 TAIL_FRACTION = 0.1  # of the readings at either end of their range, which may not belong to a rest
 # Largest half of the range of the readings at rest: the body may move a little although it seems to rest.
 MAX_HALF_RANGE_RAD_S = 2 * RATE.steady
 
 
-def check_rests_agree(turning: Turning, solution: IncrementSolution) -> None:
-    """Raise Fault `bias_contradicts_rests` if the bias differs from readings at rest, `bias_jumped` if the latter jump.
+def include_rounding(solution: IncrementSolution, at_rest: MeansAtRest | None) -> IncrementSolution:
+    """Return the solution with the rounding of its bias, if the readings at rest have coarse steps.
+
+    At rest a reading without much noise repeats the same wrong number, which no mean and no other rest shows.
+    """
+    if at_rest is None or not (at_rest.rounding > MIN_ROUNDING * np.diag(solution.covariance)[BIAS]).any():
+        return solution
+    rounding = np.zeros_like(solution.covariance)
+    rounding[BIAS, BIAS] = np.diag(at_rest.rounding)
+    causes = {**solution.causes, ROUNDING: rounding}
+    return replace(solution, covariance=solution.covariance + rounding, causes=causes)
+
+
+def check_rests_agree(solution: IncrementSolution, at_rest: MeansAtRest | None) -> None:
+    """Raise Fault `bias_contradicts_rests` if the bias differs from the readings at rest, `bias_jumped` if these jump.
 
     A rest is used only if both the readings and the rows' attitudes show it. Rests may differ by their scatter, by
     motion that the reference does not show, and by the effect of gravity on a gyroscope.
     """
-    at_rest = means_at_rest(turning, solution.clock_s)
     if at_rest is None:
         return
     readings, turned = at_rest.readings_rad_s, at_rest.rates_rad_s @ solution.matrix.T

@@ -63,6 +63,7 @@ MAX_MATRIX_STEP = 10.0  # of F: beyond it, the fit diverges
 MAX_CONDITION = 1e4
 NOISE, ATTITUDES, DELAY = "noise", "attitudes", "delay between the files"
 EARTH_RATE, INTERVAL_DIFFERENCES = "Earth's rate", "differences between stretches"
+ROUNDING = "rounding"
 AXES = "directions of the reference's axes"
 REMEDY = "Turn the body about all its axes, by a right angle and more"
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from rig.data.quantity import RATE
 from rig.estimation.arrays import Array, rotation_vectors
+from rig.estimation.statistics.rounding import Steps, bound_rounding_variance, find_steps
 from rig.observation.by_hand.rests import find_rests
 from rig.observation.external.reference_rows import Turning
 from rig.observation.external.still_attitudes import MAX_STILL_RATE_RAD_S, MAX_TIME_ERROR_S, still_windows
@@ -18,10 +19,14 @@ MIN_RESTS, MIN_TOTAL_S = 2, 1.0  # that show a scatter, and their total duration
 
 @dataclass(frozen=True, slots=True)
 class MeansAtRest:
-    """The gyroscope's mean `readings_rad_s` (k, 3) in k rests, and the body's rate from the reference (k, 3)."""
+    """The gyroscope's mean `readings_rad_s` (k, 3) in k rests, and the body's rate from the reference (k, 3).
+
+    `rounding` (3,) is the variance that rounding to coarse steps adds to each of them, alike in all rests.
+    """
 
     readings_rad_s: Array
     rates_rad_s: Array
+    rounding: Array
 
 
 def means_at_rest(turning: Turning, clock_s: float) -> MeansAtRest | None:
@@ -32,8 +37,8 @@ def means_at_rest(turning: Turning, clock_s: float) -> MeansAtRest | None:
     rows_s = turning.rows_s.mean(axis=1) + clock_s
     lying = still_windows(turning.rows_s + clock_s, turning.attitudes)
     lasting_s = 0.0
-    readings = []
-    rates = []
+    readings, rates, rounding = list[Array](), list[Array](), list[Array]()
+    steps = Steps(find_steps(turning.readings_rad_s))
     rests = find_rests(turning.time_s, {RATE: turning.readings_rad_s}, lying=lying)
     for rest in _split_single(
         [*rests, *find_rests_at_other_bias(turning.time_s, turning.readings_rad_s, lying, rests)]
@@ -44,12 +49,14 @@ def means_at_rest(turning: Turning, clock_s: float) -> MeansAtRest | None:
         rows = rows[np.argsort(rows_s[rows])]
         rate = _rate_rad_s(rows_s[rows], turning.attitudes[rows])
         if np.linalg.norm(rate) <= MAX_STILL_RATE_RAD_S:
-            readings.append(turning.readings_rad_s[inside(turning.time_s, rest)].mean(axis=0))
+            at_rest = turning.readings_rad_s[inside(turning.time_s, rest)]
+            readings.append(at_rest.mean(axis=0))
+            rounding.append(bound_rounding_variance(at_rest, steps, np.zeros_like(at_rest), at_rest.var(axis=0)))
             rates.append(rate)
             lasting_s += rest.end_s - rest.start_s
     if len(rates) < MIN_RESTS or lasting_s < MIN_TOTAL_S:
         return None
-    return MeansAtRest(np.array(readings), np.array(rates))
+    return MeansAtRest(np.array(readings), np.array(rates), np.mean(rounding, axis=0))
 
 
 def find_rests_at_other_bias(

@@ -8,6 +8,9 @@ import pytest
 from rig.analysis.external.increment_calibration import solve_turning
 from rig.analysis.external.rests_agree import check_rests_agree
 from rig.errors import Fault
+from rig.estimation.external.increment_solution import ROUNDING
+from rig.estimation.reference.reference_model import BIAS
+from rig.observation.external.means_at_rest import means_at_rest
 from support.external.followed_body import World, follow, turning
 
 pytestmark = pytest.mark.slow
@@ -23,7 +26,21 @@ def test_a_bias_that_short_rests_contradict_is_refused_and_a_sound_one_is_not(st
     sound = solve_turning(body, None, any_mounting=False).solution
     for axis in np.eye(3):
         with pytest.raises(Fault, match="bias_contradicts_rests"):
-            check_rests_agree(body, replace(sound, bias=sound.bias + OFF_RAD_S * axis))
+            off = replace(sound, bias=sound.bias + OFF_RAD_S * axis)
+            check_rests_agree(off, means_at_rest(body, sound.clock_s))
+
+
+@pytest.mark.parametrize("step_rad_s", [0.01, 1e-6])
+def test_the_bias_contains_the_rounding_that_all_rests_share(step_rad_s: float) -> None:
+    """With steps that are coarse for the noise, each rest repeats the same wrong number."""
+    world = World(duration_s=60, attitude_rad=1e-3, random_walk_rad_sqrt_s=2e-4, stops_s=(7.0, 14.0, 21.0, 28.0))
+    followed = follow(replace(world, stop_lasts_s=3.0), 1)
+    readings = step_rad_s * np.rint(followed.readings / step_rad_s)
+    solved = solve_turning(turning(replace(followed, readings=readings)), None, any_mounting=False)
+    error = np.abs(solved.solution.bias - followed.bias)
+    std = np.sqrt(np.diag(solved.solution.covariance)[BIAS])
+    assert (error < 3 * std).all(), error / std
+    assert (ROUNDING in solved.solution.causes) == (step_rad_s > 1e-3)
 
 
 @pytest.mark.proof
