@@ -16,7 +16,7 @@ Folder = Annotated[str, Field(pattern=r"^\d{2,}-[A-Za-z0-9._-]*$")]  # a plain n
 
 @dataclass(frozen=True, slots=True)
 class Begun:
-    """The beginning of a batch: operator and work order (empty if not stated), simulated laboratory or not."""
+    """The beginning of a batch: operator and work order (empty if not stated); `simulated`: the laboratory is."""
 
     operator: str
     work_order: str

@@ -33,7 +33,7 @@ class Operator:
 
     @property
     def listed(self) -> bool:
-        """Whether the numbers come from a list."""
+        """Whether the parts' serial numbers come from a list."""
         return self.numbers is not None
 
     def next_part(self, done: Sequence[BatchPart], why: str = "") -> str | None:

@@ -175,7 +175,7 @@ Parameters = Mapping[str, Parameter]
 def changes_in(pairs: Sequence[tuple[Parameters, Parameters]]) -> tuple[tuple[Change, ...], ...]:
     """Return the changes of the parameters common to each pair of calibrations, before and now.
 
-    All pairs, for example all sensors of a run, form one comparison, whose number of values is in every Change.
+    All pairs, for example all sensors of a run, form one comparison; every Change states its number of values.
     """
     shared = [[name for name in now if name in before] for before, now in pairs]
     compared = sum(map(len, shared))

@@ -63,7 +63,7 @@ def axis_errors(q_rad: ArrayLike, joint: int, arm: DenavitHartenberg = NOMINAL) 
 
 
 def flange_errors(q_rad: ArrayLike, arm: DenavitHartenberg = NOMINAL) -> Array:
-    """Return the flange's rotation vector in the base's frame for each error of each wrist, per radian: (3, 6, 3).
+    """Return rotation vectors of the flange in the base's frame, per radian of error: (3 wrists, 6 errors, 3).
 
     The joint angles are `q_rad` (n,). The six errors of a wrist are its twist, its zero, and the four `WAVES` of its
     angle. The last three joints of any chain count as wrists; the rotation is zero for errors of missing joints.
@@ -191,7 +191,7 @@ def _nearest_origin(point: Array, axis: Array, frame: Array) -> Array:
 
 
 def _transform_points(frames: list[Array], point_m: ArrayLike) -> Array:
-    """Return points (…, 3) of the flange's frame in the base frame, m."""
+    """Return the base-frame coordinates (…, 3), m, of points that `point_m` (…, 3) states in the flange's frame."""
     points = np.asarray(point_m, dtype=np.float64)
     point: Array = frames[6][..., :3, 3] + np.einsum("...ij,...j->...i", frames[6][..., :3, :3], points)
     return point

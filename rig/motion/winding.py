@@ -23,7 +23,7 @@ def _round_up_deg(angle_rad: float) -> int:
 
 
 def cable_words(plan: Plan, q_rad: Joints, names: Sequence[str]) -> list[str]:
-    """Return sentences on the slack that the flange's cable needs from its present position; joints have `names`."""
+    """Return sentences on the slack that the flange's cable needs from its present position; `names`: the joints'."""
     travels = [
         f"{name} by {_round_up_deg(-low)}° one way (-) and {_round_up_deg(high)}° the other (+)"
         for name, (low, high) in zip(names, windings_rad(plan, q_rad), strict=True)

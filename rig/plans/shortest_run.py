@@ -267,7 +267,7 @@ class _TurnerSearch:
 
 
 def _longer_s(counts: Mapping[str, int], waits_s: Mapping[str, float], others_s: Mapping[str, float]) -> float:
-    """Return the extra duration, s, by waits of `others_s` instead of `waits_s`."""
+    """Return the extra duration, s, if waits, of which there are `counts`, last `others_s` instead of `waits_s`."""
     return sum(count * (others_s[key] - waits_s[key]) for key, count in counts.items())
 
 

@@ -80,7 +80,7 @@ class Warming:
 
     @property
     def _rate_k_s(self) -> float:
-        """The rate of a ramp: below the limit, and slow enough for a nearly constant temperature in each set."""
+        """The rate of a ramp: below the limit, and so slow that temperature hardly changes during a set of sweeps."""
         allowed_k_s = RAMP_FRACTION * self.section.max_rate_k_per_min / 60
         return min(allowed_k_s, SET_FRACTION * self.section.max_step_k / max(self.set_s, 1.0))
 

@@ -338,7 +338,7 @@ class NotRemembered:
 
 @dataclass(frozen=True, slots=True)
 class Advice:
-    """The `command` to give after a failure with data in `folder`; `repeats`: it repeats refused sweeps."""
+    """The `command` to give after a failure with data in `folder`; `repeats`: whether it repeats refused sweeps."""
 
     folder: Path
     command: str

@@ -52,7 +52,7 @@ class Stations:
             self.event(ListenerDropped(type(dropped).__name__, f"{type(why).__name__}: {why}"))
 
     def confirm_part(self) -> None:
-        """Confirm the part as in the protocol; a single run has nothing to compare it with."""
+        """Confirm the part as in the protocol; do nothing in a single run, which has no other part to compare with."""
         if self.confirm is not None:
             self.confirm()
 

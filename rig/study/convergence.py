@@ -35,7 +35,7 @@ class _Example:
 
     @property
     def speed_rad_s(self) -> float:
-        """The speed for which the first pass gives Table I's values: ω² = β0 / (1 − (k/k₁)²)."""
+        """The speed ω for which the first pass gives Table I's values: ω² = β0 / (1 − (k/k₁)²); see the module."""
         scale, bias, first = np.array(self.last_scale), np.array(self.last_bias_rad_s), np.array(self.first_scale)
         missing = 1 - np.sum(scale**2) / np.sum(first**2)
         return float(np.sqrt(np.sum((scale * bias) ** 2) / missing))

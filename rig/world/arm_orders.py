@@ -24,7 +24,7 @@ class ArmWorld(Protocol):
 
 
 def build_arm_orders(world: ArmWorld) -> Mapping[str, Callable[..., Reply | None]]:
-    """Return the orders by name, as functions of their JSON arguments."""
+    """Return the orders to the simulated arm by name, as functions of their JSON arguments."""
     robot = world.laboratory.robot
 
     def claim(first: int, last: int) -> None:

@@ -249,9 +249,9 @@ def _residual_chi_square(tested: _TestedSegments) -> tuple[float, int]:
 def _whiten_with_transfers(
     matrix: Array, allowance: ErrorPatterns, bias: BiasProcess, disturbed: Sequence[int] = ()
 ) -> _TestedSegments:
-    """Return the segments with the transfers appended, their model rates, and their whitened model.
+    """Return the tested segments: the sweeps' and rests' segments and the transfers between them, in a whitened model.
 
-    Each `disturbed` transfer has a mean of its own.
+    In this model each `disturbed` transfer has a mean of its own.
     """
     transfers = allowance.transfers
     scatter = _build_scatter(transfers, allowance.transfer_patterns_rad_s, allowance)

@@ -130,7 +130,7 @@ class WhitenedReference:
         return model_basis, residuals - model_basis @ (model_basis.T @ residuals)
 
     def _chi_square_drop(self, model: Array, columns: Array, delta_rad: float) -> float:
-        """Return the χ² that columns explain in addition to the model."""
+        """Return the χ² that columns explain in addition to the model, with attitude errors of `delta_rad` (std)."""
         model_basis, residuals = self._whiten_residuals(model, delta_rad)
         projections = (
             remaining_directions(model_basis, columns / np.sqrt(1 + delta_rad**2 * self.growth)[:, None]).T @ residuals

@@ -65,5 +65,5 @@ def _read_scalar_last(attitudes: Array) -> Array:
 
 
 def _find_alignment(matrix: Array) -> float:
-    """Return the mean cosine between the axes of a sensor, rows of F (3, 3), and those of the body."""
+    """Return the mean cosine between a sensor's axes, the rows of `matrix` (3, 3), and the body's axes x, y, z."""
     return float(np.mean(np.diag(matrix) / np.linalg.norm(matrix, axis=1)))

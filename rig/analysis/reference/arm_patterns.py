@@ -67,7 +67,7 @@ def _stack_rotations(postures: Sequence[Posture], arm: DenavitHartenberg, mounti
 
 
 def _rotations(posture: Posture, arm: DenavitHartenberg, mounting: Array) -> Array:
-    """Return the errors (18, 3 or 10) of a dwell or a sweep, as in `Movement.arm_turns`, per radian of wrist error."""
+    """Return a dwell's columns (18, 3), or a sweep's (18, 10), of `Movement.arm_turns`, per radian of each error."""
     in_base = flange_errors(posture.q_rad, arm)
     in_flange = in_base @ (mounting @ flange_attitude(posture.q_rad, arm)).T
     if posture.wrist is None:

@@ -142,7 +142,7 @@ def _make_digital(
 ) -> dict[str, bytes]:
     """Return the digital certificate by its file name, signed if there is a signatory; empty if it could not be made.
 
-    The reason is appended to `left_out`, or printed if that is None.
+    If it could not be made, the error is appended to `left_out`, or printed if `left_out` is None.
     """
     from rig.report.certificate.dcc import DCC, digital_certificate
 

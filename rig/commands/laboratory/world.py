@@ -37,7 +37,7 @@ def run(options: Namespace) -> int:
 
 
 def _practise(control: str) -> int:
-    """Cause each incident typed by the user, until the end of the input; return 0."""
+    """Cause each incident that the user types, by the channel `control`, until the input ends; return 0."""
     from rig.commands.laboratory.practice import opening_text, practise
     from rig.station.plain_text import say
 

@@ -156,7 +156,7 @@ def budget(explained: VectorFit, unknown: UnknownErrors) -> Budget:
 
 
 def _contributors(explained: VectorFit, unknown: UnknownErrors) -> Iterator[Contributor]:
-    """Yield the contributors; the solution's response propagates a pattern of errors in the readings."""
+    """Yield the contributors; errors of the readings are propagated by the solution's derivatives (`response`)."""
     solution, inputs = explained.solution, explained.inputs
     matrix = solution.matrix
 

@@ -148,13 +148,13 @@ class CommonErrorModel:
 
 
 def _build_noise(variances: Array, shared: Array | None) -> Array:
-    """Return the covariances (3, N, N) of each axis' means, from variances (N, 3) and a covariance (N, N) of all."""
+    """Return the covariances (3, N, N) of each axis' means, from variances (N, 3) and a `shared` covariance (N, N)."""
     noise = np.array([np.diag(axis) for axis in variances.T])
     return noise if shared is None else noise + shared
 
 
 def _gain(design: Array, effects: Array, noise: Array) -> tuple[Array, Array]:
-    """Return the gain (P, N, 3) from readings with `noise` (3, N, N) to the errors, and their covariance (P, P)."""
+    """Return the gain (P, N, 3) from readings with `noise` (3, N, N) to errors, and the errors' covariance (P, P)."""
     weights = np.linalg.inv(noise)
     weighted = weights @ design
     # The weights after removing what F, c and G explain (Frisch and Waugh, Econometrica 1 (1933) 387; Lovell 1963).

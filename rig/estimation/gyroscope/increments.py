@@ -169,7 +169,7 @@ def _integrate_block(interval: _Interval, at_s: Array, inverse: Array) -> tuple[
 
 @dataclass(frozen=True, slots=True)
 class _IncrementSteps:
-    """Steps that begin at readings: rotation vectors (k, 3), integrals (k, 3) of the rate, durations (k, 1)."""
+    """Steps that each begin at a reading: rotation vectors (k, 3), integrals (k, 3) of the rate, durations (k, 1)."""
 
     vectors: Array
     integrals_rad: Array

@@ -19,7 +19,7 @@ DISTINCT_SPEED_RATIO = 1.05
 
 @dataclass(frozen=True, slots=True)
 class Nonlinearity:
-    """The parts `odd_per_rad_s`, `even_per_rad_s` (3,) of each axis, and their standard deviations."""
+    """The coefficients odd and even (3,) of the module's equation for each axis, and their standard deviations."""
 
     odd_per_rad_s: Array
     even_per_rad_s: Array

@@ -252,7 +252,7 @@ def _perpendicular_axes(axis: Array) -> Array:
 
 
 def _solve(equations: Sequence[_ObservationEquations]) -> tuple[Array, Array]:
-    """Return the least-squares step (12,) of matrix, row by row, and offset, and its covariance."""
+    """Return the least-squares step (12,) of the matrix (by rows) and then the offset, and the step's covariance."""
     information, gradient = np.zeros((12, 12)), np.zeros(12)
     for equation in equations:
         weighted = equation.design.T @ np.linalg.inv(equation.covariance)

@@ -1,4 +1,4 @@
-"""The uncertainty budget of the six-observation solution, from its response to the mean readings.
+"""The uncertainty budget of the six-observation solution, from its derivatives by the mean readings.
 
 The six-observation model uses speeds alone, so errors of directions do not matter. But it assumes orthogonal sensor
 axes, which adds a contributor.

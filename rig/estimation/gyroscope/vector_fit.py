@@ -190,7 +190,7 @@ def explain(inputs: VectorInputs, nominal_mounting: Array, process: BiasProcess 
 def _explain(
     inputs: VectorInputs, mounting: Array, gravity_m_s2: Array | None, process: BiasProcess | None
 ) -> VectorFit:
-    """Return the fit with the bias drift `process`, which is estimated from the residuals of a steady bias if None."""
+    """Return the fit with the bias drift `process`; if None, it is estimated from the residuals of a steady bias."""
     several = len(inputs.speeds_rad_s) > 1
     arm_errors = inputs.arm_errors_rad_s
 

@@ -205,7 +205,7 @@ def maximise_likelihood(
 def _find_uncertainty(delta: float, fit: Array, rotations: Array) -> float:
     """Return the std of the attitude error `delta` δ, from the expected information on δ².
 
-    The information is tr((P G)²)/2 with G = E Eᵀ, the effects E (`rotations`), and the residual maker P of the `fit`.
+    The information is tr((P G)²)/2 with G = E Eᵀ, the effects E (`rotations`), and P, which maps readings to residuals.
     """
     orthogonal = np.linalg.qr(fit)[0].reshape(*rotations.shape[:2], -1)
     growth = rotations @ np.swapaxes(rotations, -1, -2)

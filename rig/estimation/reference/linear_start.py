@@ -2,9 +2,9 @@
 
     F⁻¹ m − A v_ref − L (p + r) − b* = 0,   b* = F⁻¹ b
 
-A and L map v_ref and the lever arm to the specific force (`rig.estimation.reference.accelerometer_model`), without
-delay. The given L p would make the problem inhomogeneous. So F L p, a few percent of gravity, is subtracted from the
-readings, with the F of a first solution without L p.
+A maps v_ref, and L the lever arm p + r, to the specific force (`rig.estimation.reference.accelerometer_model`), without
+delay. The given L p, with p from the axis to the flange, would make the problem inhomogeneous. So F L p, a few percent
+of gravity, is subtracted from the readings, with the F of a first solution without L p.
 """
 
 import numpy as np

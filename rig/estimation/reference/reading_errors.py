@@ -53,7 +53,7 @@ def nonlinearity_patterns(theta: Array, movement: Movement) -> Array:
 
 
 def bias_warming(movement: Movement) -> Array:
-    """Return the patterns (6, 3 K) of one standard uncertainty of the temperature coefficient of each axis's bias.
+    """Return the readings' errors (6, 3 K) due to one standard uncertainty of each bias's temperature coefficient.
 
     Three are for the recorded temperature, three for changes smaller than a step of the thermometer.
     """

@@ -82,7 +82,7 @@ def scale_and_bias(matrix: Array, scale: Array, parameters: int) -> Array:
 
 
 def scale_and_bias_covariance(matrix: Array, scale: Array, covariance: Array) -> Array:
-    """Return the covariance (6, 6) of scale and bias, with the signs of `scale_and_bias`, from the parameters'."""
+    """Return the covariance (6, 6) of scale and bias, signed as in `scale_and_bias`, from that of the parameters."""
     to_parameters = scale_and_bias(matrix, scale, len(covariance))
     propagated: Array = to_parameters @ covariance @ to_parameters.T
     return propagated

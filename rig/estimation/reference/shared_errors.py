@@ -55,9 +55,10 @@ def add_uncertainty(readings: Decorrelation, std_rad: float, jacobian: Array) ->
 
 
 def information(growth: Array, std_rad: float, slopes: Array) -> float:
-    """Return the expected information on the shared errors' variance: tr((P G)²)/2.
+    """Return the expected information on the shared errors' variance `std_rad`²: tr((P G)²)/2.
 
-    G is the part of the readings' covariance per unit of that variance, and P the residual maker of `slopes` (n, q).
+    The readings' covariance is V = I + `std_rad`² G with G = diag(`growth`). P is V⁻¹ times the matrix that maps the
+    readings to their residuals from the weighted fit of `slopes` (n, q).
     """
     variance = 1 + std_rad**2 * growth
     growth = growth / variance

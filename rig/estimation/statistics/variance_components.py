@@ -73,8 +73,9 @@ class _Ascent:
     """A search for a maximum of the posterior of the logarithms (k,) of standard deviations.
 
     - point (k,): the end of the search; value: the negative log-posterior there.
-    - ridge: the visited points that are lower than the last one by at most `RIDGE_DROP`.
-    - joins: whether the search ended near the ridge of an earlier search, which it would have followed to its maximum.
+    - ridge: the visited points at which the log-posterior is below that of `point` by at most `RIDGE_DROP`.
+    - joins: whether the search was ended because it came near the ridge of an earlier search, whose maximum it would
+      have reached too.
     """
 
     point: Array

@@ -3,9 +3,9 @@
 Scale, axes and reference are fixed, because their errors, and those of the arm's attitudes, are the same in every
 repeat of an attitude and cancel in the differences between repeats.
 
-The bias stepped before a repeat if the means before and from this repeat differ significantly. A steady bias seems to
-step in at most 2 % of runs, over all repeats and axes together (Bonferroni's inequality). The repeats before a step and
-those after it are then tested again (binary segmentation: Scott and Knott 1974).
+The bias stepped before a repeat if the mean over all earlier repeats and the mean over all others differ significantly.
+A steady bias seems to step in at most 2 % of runs, over all repeats and axes together (Bonferroni's inequality). The
+repeats before a step and those after it are then tested again (binary segmentation: Scott and Knott 1974).
 """
 
 from collections.abc import Iterator

@@ -98,7 +98,10 @@ def _constant(changes: Array, centre: Array) -> Array:
 
 
 def _centre_coefficients(fit: TemperatureFit, centre: Array) -> Array:
-    """Return coefficients (24,), relative for k, that do not change the mean over the readings."""
+    """Return the coefficients (24,) of orders 0 to 3: first those of the scale, relative, then those of the bias.
+
+    Order 0 is such that the mean value over the readings does not change.
+    """
     parts = [(changes, centre[i]) for i, changes in enumerate((fit.relative, fit.bias))]
     return np.concatenate([np.concatenate([_constant(*part)[None], part[0]]).ravel() for part in parts])
 

@@ -40,7 +40,7 @@ class RepeatedMeans:
 class TemperatureFit:
     """One fit: the coefficients of (T − reference)ⁿ for n = 1 to 3 (rows) and each axis (columns).
 
-    `relative` (3, 3): those of k, as fractions of k at the reference; `bias` (3, 3): those of c.
+    `relative` (3, 3): those of the scale factors k, as fractions of k at the reference; `bias` (3, 3): those of c.
     `covariance` (18, 18) includes the effect of the fitted lag, `without_lag` (18, 18) does not. `loop`: hysteresis
     (6,) of scale and bias, and its standard deviation; None unless the sensor was both warmed and cooled.
     """
@@ -205,7 +205,7 @@ class ParameterFits:
         return TemperatureFit(relative, bias, covariance, without_lag, aicc, float(values[-1]), lag_std_s, loop)
 
     def centre(self, fit: TemperatureFit) -> Array:
-        """Return the mean powers (2, 3, 3) of T − reference, weighted as in the means of k and of c."""
+        """Return the mean powers (2, 3, 3) of T − reference, weighted as in the means of scale, then of bias."""
         powers = self.powers[:, 1:] * self.span ** np.arange(1.0, MAX_ORDER + 1)
         centre: Array = np.einsum("qan,np->qpa", self.weights, powers) / self.weights.sum(axis=2)[:, None, :]
         return centre
@@ -216,7 +216,7 @@ class ParameterFits:
         return self.rescale(take @ covariance @ take.T)
 
     def rescale(self, covariance: Array) -> Array:
-        """Return the covariance (24, 24) for absolute instead of relative k."""
+        """Return the covariance (24, 24) of the coefficients, with those of the scale absolute instead of relative."""
         size = np.concatenate([np.tile(self.scale, MAX_ORDER + 1), np.ones(COEFFICIENT_COUNT // 2)])
         scaled: Array = np.outer(size, size) * covariance
         return scaled

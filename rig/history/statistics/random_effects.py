@@ -34,7 +34,7 @@ class FittedModel:
         return float(stdtrit(self.dof, (1 + CONFIDENCE) / 2))
 
     def p_value(self, index: int) -> float:
-        """Return the probability that a coefficient with true value 0 is at least as far from 0 as number `index`."""
+        """Return the probability that an estimate lies as far from 0 as coefficient `index` if the true value is 0."""
         from scipy.special import stdtr
 
         return float(2 * stdtr(self.dof, -abs(self.coefficients[index]) / self.std[index]))

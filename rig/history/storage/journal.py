@@ -47,7 +47,7 @@ def lock_out_writers(connection: Connection) -> None:
 
 
 def note(connection: Connection, table: Table, *key: int | str) -> None:
-    """Enter the `table`'s row with this key, for a run with its parts. Call `lock_out_writers` before."""
+    """Enter the hash of the row of `table` with this key, and of a run's parts. Call `lock_out_writers` before."""
     before = head(connection)
     line = {
         "number": before.number + 1,

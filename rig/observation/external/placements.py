@@ -209,7 +209,7 @@ def _mask_inner(rest: NDArray[np.intp], windows_s: Array, starts_s: Array, ends_
     """Return a mask (N,) of the rows in a rest, except rows near the start or end of the rest.
 
     Near the ends a reference that lags shows motion. If all rows of a rest are near an end, the mask includes them
-    all. `rest` (N,) are the numbers of the rows' rests, −1 without one.
+    all. `rest` (N,): the number of the rest in which each row lies, or −1.
     """
     at_rest = np.flatnonzero(rest >= 0)
     middles_s, number = windows_s[at_rest].mean(axis=1), rest[at_rest]

@@ -99,7 +99,7 @@ def _select_evenly(indices: NDArray[np.intp]) -> NDArray[np.intp]:
 
 
 def _fit(design: Array, turned: Array) -> tuple[float, Array]:
-    """Return the fraction of `turned` (k, 3) that `design` (k, 4) X does not explain, and the fitted X: Fᵀ above b."""
+    """Return the fraction of `turned` (k, 3) that the fit `design` (k, 4) · X leaves unexplained, and X: Fᵀ above b."""
     aligned = np.concatenate([np.eye(3), np.zeros((1, 3))])
     weight = np.ones(len(design))
     solution = aligned

@@ -65,7 +65,7 @@ def is_in_format(path: Path) -> bool:
 
 
 def whole(path: Path) -> Path:
-    """Return the path of the file or folder, without the part inside that it may select."""
+    """Return `path` up to the file or folder itself, without the name of a part inside that may follow."""
     return Path(str(path).partition(MEMBER_SEPARATOR)[0])
 
 

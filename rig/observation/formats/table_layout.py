@@ -233,7 +233,7 @@ def _describe(  # noqa: PLR0917
 
 
 def _strip_columns(cells: Sequence[Sequence[str]], missing: Sequence[str]) -> list[list[str]]:
-    """Return the columns of rows of cells, with blanks and missing values removed."""
+    """Return the columns of a table whose rows are `cells`, without blank cells and the marks of `missing` values."""
     return [
         [cell.strip() for cell in column if cell.strip() not in {"", *missing}] for column in zip(*cells, strict=True)
     ]

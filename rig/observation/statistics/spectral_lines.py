@@ -87,7 +87,7 @@ def _are_too_near(cycles: Array, search: LineSearch) -> bool:
 
 
 def median_power(residuals: Array) -> float:
-    """Return the median power of residuals (n, axes), tapered by the search's window, on the quietest axis."""
+    """Return the median power of the quietest axis of residuals (n, axes), tapered as in the search for lines."""
     return float(median(np.abs(np.fft.rfft(apply_window(residuals).T)) ** 2).min())
 
 

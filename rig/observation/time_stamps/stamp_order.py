@@ -49,9 +49,9 @@ CATCH_UP_STEPS = 6  # number of readings, in lengths of the step, within which a
 
 @dataclass(frozen=True, slots=True)
 class StampFinding:
-    """A `reason` why `count` rows of a log are left out (`left_out`) or have new times, and the first row.
+    """A `reason` why `count` rows of a log are left out (`left_out`) or, if not left out, have new times.
 
-    `sample` is the first row's number in the log, from 1; `time_s` its stamp.
+    `sample` is the number, from 1, of the first of these rows in the log; `time_s` is its stamp.
     """
 
     reason: str

@@ -96,7 +96,7 @@ class Mailbox:
         self.closed = False
 
     def put(self, frame: bytes) -> None:
-        """Store a frame. If the mailbox is full, drop both frames, and send the complete state next."""
+        """Store a frame. If the last one was not taken yet, drop both; `take` then returns the complete state."""
         self._behind = self._behind or self._frame is not None
         self._frame = None if self._behind else frame
         self._news.set()

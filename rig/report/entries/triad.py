@@ -86,7 +86,7 @@ def _attitude_error(error: AttitudeError | None) -> dict[str, float | None]:
 
 
 def _other_entry(models: Models[Any], other: TriaxialSolution) -> Entry:
-    """Return the entry of another method's solution."""
+    """Return the entry of a solution by a method other than the chosen one."""
     return entry(models.other, other, scale=scale_of(other.matrix), **{models.quantity.file_key("bias"): other.bias})
 
 

@@ -53,7 +53,7 @@ def inspect_xml(name: str, content: bytes, trust: Trust) -> FileInspection:
 
 
 def _method(certificate: Certificate) -> SignatureMethod:
-    """Return the signature method for the kind of this key."""
+    """Return the signature method for the kind of the certificate's key."""
     rsa = isinstance(certificate.public_key(), RSAPublicKey)
     return SignatureMethod.RSA_SHA256 if rsa else SignatureMethod.ECDSA_SHA256
 

@@ -231,7 +231,7 @@ def _have_valid_bytes(
 
 
 def _count(positions: NDArray[np.intp], line_starts: NDArray[np.intp], line_ends: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return the number of the increasing `positions` in each line."""
+    """Return how many of the increasing `positions` lie in each line."""
     counts: NDArray[np.intp] = np.searchsorted(positions, line_ends) - np.searchsorted(positions, line_starts)
     return counts
 

@@ -73,9 +73,9 @@ class _ImuStream:
         self.description = describe(self.name, self.section, provides_temperature=self.thermometer.provides)
 
     def take(self, message: Any, *, is_consecutive: bool) -> tuple[int, int, ImuReading] | None:
-        """Return number, time and reading of a message; None for a repeated or incomplete reading.
+        """Return a message's reading, after its number and time in µs; None for a repeated or incomplete reading.
 
-        `is_consecutive`: whether no message was lost before it.
+        `is_consecutive`: whether no message was lost before this one.
         """
         reading = decode_reading(message)
         if not self.thermometer.provides:
@@ -238,7 +238,7 @@ def check_parameters(
 
 
 def describe(name: str, section: SensorSection, *, provides_temperature: bool = True) -> RecordedSensor:
-    """Return the description of the samples for a recording; without a connection a temperature is assumed."""
+    """Return the description of the samples for a recording; before a connection a temperature is taken as provided."""
     integer = is_integer(mavlink_section(section).imu)
     stated = mavlink_section(section).temperature
     channels = [

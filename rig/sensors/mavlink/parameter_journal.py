@@ -34,7 +34,7 @@ class ParameterChange:
     backup: Path
 
     def state(self, parameters: Mapping[str, AutopilotParameter]) -> str:
-        """Return the set that `parameters` equal, bit by bit: "old", "new", or else "mixture"."""
+        """Return "old" or "new" if `parameters` equal the old or the new values bit by bit, otherwise "mixture"."""
         fields = {name: parameter.field for name, parameter in parameters.items()}
         for name, expected in (("new", self.new), ("old", self.old)):
             if fields == {key: parameter.field for key, parameter in expected.items()}:
@@ -42,7 +42,7 @@ class ParameterChange:
         return "mixture"
 
     def serialize(self) -> str:
-        """Return the text of the file: four bytes of each value in hexadecimal, and their values for readers."""
+        """Return the text of the file: each value as four bytes in hexadecimal, and as a number for human readers."""
         sets = {
             name: {
                 entry.name: {"type": entry.type, "bytes": entry.field.hex(), "value": entry.value} for entry in group

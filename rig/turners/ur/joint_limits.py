@@ -105,5 +105,5 @@ def _fractions(motion: Motion) -> Array:
 
 
 def _narrower(ours: float, theirs: float | None) -> tuple[float, str]:
-    """Return the narrower limit and its owner: the model (`ours`), also if both nearly agree, or the controller."""
+    """Return the narrower limit and its owner: the model for `ours`, also if both nearly agree, else the controller."""
     return (ours, RIG_LIMIT) if theirs is None or theirs >= ours * (1 - LIMIT_TOLERANCE) else (theirs, CONTROLLER_LIMIT)

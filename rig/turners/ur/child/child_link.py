@@ -180,7 +180,7 @@ class ChildLink:
             self._sending.release()
 
     def _give_up(self, name: str, what: str) -> None:
-        """End an unresponsive child, whose client would upload its script again if it reconnected."""
+        """End an unresponsive child, whose client could upload its script again; report the problem `name`, `what`."""
         self._ended.set()
         self._process.kill()
         self._lose(name, what)

@@ -36,7 +36,7 @@ class StopOrder:
             threading.Thread(target=self._give, args=(path,), name=f"arm stop by {path.name}", daemon=True).start()
 
     def await_delivery(self) -> bool:
-        """Wait until every path has delivered the order or failed; return whether that was within the order's time.
+        """Wait until every path has delivered the order or failed; return whether all did so within `timeout_s`.
 
         A later delivery would end a program that is started after the stop.
         """
@@ -106,7 +106,7 @@ class StopOrder:
             self._changed.notify_all()
 
     def _ask(self, path: StopPath, connection: StopConnection) -> None:
-        """Poll until the program has ended and the path has answered the order."""
+        """Poll until the program has ended and the path has answered the stop order."""
         looks = 0
         while connection.reports_programs and self._remaining_s > 0.0:
             running = connection.program_running()
