@@ -149,7 +149,7 @@ def _read_field(
 def _observe_sweeps(
     run: RunData, name: str, stream: Stream, motion: ArmMotion
 ) -> tuple[Attempts[int, Observation], Sequence[Average]]:
-    """Return the observed sweeps with the refusals of the others, and the averaged rests."""
+    """Return the observations of sweeps or why they were refused, by the sweep's index, and the averaged rests."""
     thresholds = run.settings.observation
     sweeps = observe_each_sweep(run, stream, motion, thresholds)
     dwells = {dwell.index for dwell in run.settings.planned_dwells}

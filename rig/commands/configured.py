@@ -45,7 +45,7 @@ def load_configured(
 
 
 def change_configured(configured: Configured, overrides: Sequence[str]) -> Configured:
-    """Return the configuration with `overrides` as for `load`. Raise Refused as `load_configured` does."""
+    """Return the configuration changed by `overrides` (`key=value`). Raise Refused as `load_configured` does."""
     procedures: Procedures = {**load_procedures(), configured.script.procedure.name: configured.script.procedure}
     with script_errors(f"the section of {configured.script.name} fails"):
         loaded = parse(configured.loaded.text, "configuration", overrides, sections(procedures), turners.sections())

@@ -131,7 +131,7 @@ def load_statement(overrides: Sequence[str]) -> StatementConfig:
 
 
 def load_as(model: type[Model], path: str | Path, give: str) -> Model:
-    """Return the section, of this `model`, that a file holds. Raise `ConfigurationRefused` as `load` does.
+    """Return the section that a file holds, as a `model`. Raise `ConfigurationRefused` as `load` does.
 
     `give` is the remedy for a file that cannot be read.
     """

@@ -132,7 +132,7 @@ class ArmSection(TurnerSection):
         return self.host
 
     def override_host(self, host: str) -> Mapping[str, str]:
-        """Return the key of the controller's host, with another `host` as its value."""
+        """Return the change of the section that sets the controller's host to `host`, as value by key."""
         return {"host": host}
 
     @property

@@ -33,7 +33,7 @@ class Attempts(Generic[Key, Result]):
     def results_by_key(
         self, of_result: Callable[[Result], Converted], of_fault: Callable[[Fault], ConvertedFault]
     ) -> dict[Key, Converted | ConvertedFault]:
-        """Return each result converted by `of_result`, then each Fault converted by `of_fault`."""
+        """Return, by key, each result converted by `of_result`, then each Fault converted by `of_fault`."""
         values: dict[Key, Converted | ConvertedFault] = {key: of_result(result) for key, result in self.results.items()}
         for key, fault in self.faults.items():
             values[key] = of_fault(fault)

@@ -138,7 +138,7 @@ def check_reads(matrix: Array) -> None:
 
 
 def check_unit(scale: Array, confusions: Sequence[tuple[float, str]] = ANGLE_UNIT_RATIOS) -> None:
-    """Raise Fault `wrong_unit`, which names the likely unit if any, for a scale factor (3,) above 4 or below 1/4."""
+    """Raise Fault `wrong_unit` for a scale factor (3,) above 4 or below 1/4, naming the likely one of `confusions`."""
     if not is_plausible(scale).all():
         typical = float(np.exp(np.mean(np.log(scale))))
         raise wrong_unit(f"the scale factors come out near {typical:.3g}", 1 / typical, confusions)

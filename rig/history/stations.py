@@ -109,7 +109,7 @@ _LENGTHS = ((station.c.rig, MAX_NAME), (station.c.computer, MAX_NAME), (station.
 
 
 def _text(connection: Connection, column: ColumnElement[str], most: int) -> ColumnElement[Any]:
-    """Return the beginning of a text; from SQLite as bytes, because SQLite's columns may hold invalid UTF-8."""
+    """Return a text's first `most` characters; from SQLite as bytes, because its columns may hold invalid UTF-8."""
     start = func.substr(column, 1, most)
     return cast(start, LargeBinary) if connection.dialect.name == "sqlite" else start
 

@@ -198,7 +198,7 @@ class History:
         return self._pasts(select(*_COLUMNS).select_from(_ROWS).where(_RUN.id == run_id).order_by(*_IN_TIME))
 
     def void(self, number: int, reason: str) -> None:
-        """Mark a calibration as void. Raise Refused `not_in_history`, `already_voided`, `entry_not_kept`."""
+        """Mark the calibration `number` as void. Raise Refused `not_in_history`, `already_voided`, `entry_not_kept`."""
         before = self.calibration(number).voided
         if before is not None:
             raise Refused(

@@ -38,7 +38,7 @@ def convert_own_readings(readings: ArrayLike, quantity: Quantity, limit: float |
 
 
 def _refuse_other_units(values: Array, quantity: Quantity, limit: float | None, whose: str) -> None:
-    """Raise Refused `wrong_unit` if readings exceed the sensor's range, or look like g."""
+    """Raise Refused `wrong_unit` if readings exceed the range `limit`, or look like g; `whose` names the sensor."""
     mistaken = quantity.mistaken
     most = MAX_RANGE_RATIO * limit if limit is not None else np.inf if mistaken is None else mistaken.most
     largest = float(np.abs(values[~np.isnan(values)]).max(initial=0.0))

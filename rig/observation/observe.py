@@ -310,7 +310,7 @@ def _check_frozen(readings: Array, rate_read: Array, expected_rad_s: Array, wher
 
 
 def _check_direction(rate_read: Array, expected: Array, where: str, settings: ObservationThresholds) -> None:
-    """Raise Fault `wrong_sign` or `wrong_axis` if the reading without bias is not along the nominal axis."""
+    """Raise Fault `wrong_sign` or `wrong_axis` if the reading without bias is not along `expected` (3,)."""
     cosine = float(rate_read @ expected / (np.linalg.norm(rate_read) * np.linalg.norm(expected)))
     angle = float(np.degrees(np.arccos(np.clip(cosine, -1, 1))))
     limit = settings.max_axis_deviation_deg

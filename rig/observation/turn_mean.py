@@ -181,7 +181,7 @@ def _find_turn_lines(readings: Array, steady: Array, turn: SampledTurn) -> Lines
 
 
 def lag_columns(rate: Array, columns: Array, fraction: Array) -> Array:
-    """Return columns (n, 2) by which a lagging sensor misreads a rate's slow ripple, or (n, 0) if it has no ripple.
+    """Return columns (n, 2) by which a lagging sensor misreads a rate's slow ripple, or (n, 0) without slow ripple.
 
     The ripple is sought in the part of the `rate` (n,) that `columns` (n, k) do not explain.
     """

@@ -147,7 +147,7 @@ def draw_drift(panel: "Axes", rows: list[dict[str, Any]], unit_name: str, limit:
 
 
 def find_drift_errors(rows: list[dict[str, Any]], column_unit: str, unit: str) -> Iterator[StudyFinding]:
-    """Yield the RMS error of the bias over repeats and axes, with the other parameters fixed and with all estimated."""
+    """Yield two RMS errors of the bias over repeats and axes: for F and reference fixed, then for all estimated."""
     for kind, words in (("held", "F and reference fixed"), ("free", "all parameters estimated")):
         axes = [f"bias_{axis}_{column_unit}" for axis in "xyz"]
         errors = [row[f"{kind}_{axis}"] - row[f"true_{axis}"] for row in rows for axis in axes]

@@ -131,7 +131,7 @@ def sweep_columns(segments: Segments, sweep: int) -> Array:
 
 
 def step_columns(segments: Segments) -> list[Array]:
-    """Return a step (N, 1) at each end of a sweep that has rests on both sides: 0 before the end, 1 after it."""
+    """Return a step (N, 1), 0 before and 1 after, at the end of each sweep that lies between rests."""
     middle = segments.times_s.mean(axis=1)
     ends = [segments.times_s[segments.sweep == sweep].max() for sweep in distinct(segments.sweep[segments.sweep >= 0])]
     steps = [np.where(middle < end, 0.0, 1.0)[:, None] for end in ends]

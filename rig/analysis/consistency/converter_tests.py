@@ -195,7 +195,7 @@ def _is_one_bit(powers: Array) -> bool:
 
 
 def _skewness(windows: Sequence[RawReadings], axes: NDArray[np.bool_], critical_value: float) -> tuple[float, float]:
-    """Return the largest skewness of the noise of any axis at rest, which bit errors cause, and its limit.
+    """Return the largest skewness, which bit errors cause, of the noise at rest of the `axes`, and its limit.
 
     Readings in motion are not used, because the arm's vibration may be skewed.
     """

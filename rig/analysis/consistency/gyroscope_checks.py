@@ -317,7 +317,7 @@ def _test_bias_jump(
         return None
 
     def explain_step(step: Array, nuisance: Array) -> float:
-        """Return the χ² of a step of the bias, with the bias process estimated together with `nuisance`."""
+        """Return the χ² that a step of the bias explains if the bias process is estimated together with `nuisance`."""
         bias = _estimate_bias_process(segments, axis_rates, nuisance, scatter)
         whitener = build_whitener(segments, scatter, bias)
         readings = apply_whitener(whitener, (segments.means_rad_s - axis_rates).T[:, :, None])[:, 0]

@@ -145,7 +145,7 @@ def _axis_errors(turns: Sequence[Observation], rests: int, axis_deg: float) -> A
 
 
 def _return_errors(turns: Sequence[Observation], rests: int, uncertainty: Uncertainty) -> Array:
-    """Return the errors (P, N, 3) of joints that return imperfectly to a sweep's axis, as in `VectorInputs`."""
+    """Return `VectorInputs.return_errors_rad_s` (P, N, 3), due to joints that return imperfectly to a sweep's axis."""
     errors = np.array([turn.speed_rad_s * turn.axis_errors for turn in turns if turn.axis_errors is not None])
     tilts = uncertainty.repeatability_std_rad * np.swapaxes(errors[:, ZERO_INDICES], 0, 1)
     visits = np.array([np.isin(np.arange(len(turns)), visit) for visit in _group_by_axis(turns)])

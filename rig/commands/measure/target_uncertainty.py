@@ -68,7 +68,7 @@ def print_shortest_run(options: Namespace) -> int:
 
 
 def parse_target(options: Sequence[str], at_most_s: float | None) -> "TargetUncertainty":
-    """Return the targets in options such as `scale=U` and `bias=U`. Raise Refused `bad_option`."""
+    """Return the targets in options such as `scale=U`, and the longest duration. Raise Refused `bad_option`."""
     from rig.analysis.design.candidate_search import TargetUncertainty
 
     uncertainties: dict[str, float] = {}

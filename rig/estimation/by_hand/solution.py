@@ -308,7 +308,7 @@ def _largest_of_factor(fit: GraphFit, row: Factor) -> float:
 
 
 def _summarise_move(fit: GraphFit, row: int) -> MoveSummary:
-    """Return the kind and angle of a move, and its residuals against the rest of the session."""
+    """Return the kind and angle of the move `row`, and its residuals in the fit of the whole session."""
     move, turns = fit.session.moves[row], fit.faces.turns[row]
     closure = next((factor for factor in fit.factors if factor.kind == CLOSURE and factor.index == row), None)
     return MoveSummary(

@@ -337,7 +337,7 @@ def _causes(settled: _ConvergedFit) -> dict[str, Array]:
 
 
 def _earth(rate_rad_s: Array, covariance: Array) -> EarthRateEstimate | Fault:
-    """Return the Earth's rate from the increments, without the prior of its norm, or a Fault if undetected."""
+    """Return the Earth's rate from the increments, with the prior of its norm removed, or a Fault if undetected."""
     information = np.linalg.inv(covariance)
     data_information: Array = information - EARTH_PRECISION * np.eye(3)
     data_information = data_information + 1e-9 * EARTH_PRECISION * np.eye(3)

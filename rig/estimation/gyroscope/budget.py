@@ -77,7 +77,7 @@ class Budget:
         return {contributor.name: contributor for contributor in self.contributors}[name]
 
     def std_of(self, name: str) -> Array:
-        """Return the standard uncertainties (6,) due to one contributor. Raise KeyError as `line` does."""
+        """Return the standard uncertainties (6,) due to the contributor `name`. Raise KeyError if there is none."""
         return self.line(name).std
 
     def omit(self, names: Collection[str]) -> "Budget":
@@ -238,7 +238,7 @@ def _evaluate_mounts(explained: VectorFit, unknown: UnknownErrors, propagate: Pr
 def _evaluate_times(
     inputs: VectorInputs, unknown: UnknownErrors, turned: Array, propagate: Propagate
 ) -> Iterator[Contributor]:
-    """Yield the contributors of the times of the arm's states and of the sensor's samples."""
+    """Yield the contributors of the times of the arm's states and of the samples; `turned` as in `_contributors`."""
     per_s = np.sqrt(2) / np.diff(inputs.windows_s).T[0]
     per_sweep = np.eye(len(turned))[:, :, None]
     jitter = per_sweep * ((unknown.state_jitter_s * per_s * inputs.state_gains)[:, None] * turned)[None]

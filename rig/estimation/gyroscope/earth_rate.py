@@ -174,7 +174,7 @@ class _EarthRateFit:
 def _fit(
     inputs: VectorInputs, mounting: Array, directions: Array, gravity: Array | None, prior: EarthRatePrior
 ) -> _EarthRateFit:
-    """Return the fit of the vector model with common errors; the last ones are the Earth's rate along `directions`."""
+    """Return the fit of the vector model with common errors, of which the last are the Earth's rate by `directions`."""
     speeds = np.linalg.norm(inputs.turns_rad_s, axis=1)
     durations = np.diff(inputs.windows_s).T[0]
     by_states = np.sqrt(2) * prior.state_jitter_s * inputs.state_gains / durations * speeds  # at both ends

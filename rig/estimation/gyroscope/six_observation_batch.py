@@ -92,7 +92,7 @@ def _responses(means: Array, speeds_rad_s: ArrayLike) -> tuple[Array, Array, Arr
 
 
 def _solve(matrices: Array, right: Array) -> Array:
-    """Return the solutions (R, 6, 2) of linear systems, NaN for a singular matrix."""
+    """Return the solutions (R, 6, 2) of linear systems for two right-hand sides each, NaN for a singular matrix."""
     try:
         return np.asarray(np.linalg.solve(matrices, right), dtype=np.float64)
     except np.linalg.LinAlgError:

@@ -291,7 +291,7 @@ def _raw_covariance(inverse: Array, variances: Array, speed_noise: Array | None,
 
 @cache
 def index_coefficients(columns: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the coefficients' indices: (12,) of matrix, row by row, and offset; then those of the g-sensitivity."""
+    """Return the indices of coefficients, `columns` for each axis: (12,) of F by rows and c, then those of G."""
     index = np.arange(3 * columns, dtype=np.intp).reshape(3, columns)
     return np.concatenate([index[:, :3].ravel(), index[:, 3]]), index[:, 4:].ravel()
 

@@ -175,7 +175,7 @@ def maximise_likelihood(
     projected = residuals - basis @ (basis.T @ residuals)
 
     def negative_logs(log_deltas: Array) -> Array:
-        """Return (χ² + ln det V + ln det of the slopes' information)/2, (m,), at ln δ (m,); V = diag(1 + δ² γ)."""
+        """Return (χ² + ln det V + ln det of the slopes' information)/2, (m,), by ln δ (m,); V = diag(1 + δ² γ)."""
         weights = 1 / (1 + np.exp(2 * log_deltas)[:, None] * growth)  # diagonal of V⁻¹
         try:
             # Cholesky factor of the coefficients' information

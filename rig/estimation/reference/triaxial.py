@@ -234,7 +234,9 @@ def _check_scale(scale: Array, m: Array, prior: ReferencePrior) -> None:
 
 
 def _conditioning(scaled: Array, m: Array, v: Array, needed: int) -> refusals.Conditioning:
-    """Return the conditioning of the scaled design; directions dominated by noise do not count towards the rank."""
+    """Return the conditioning of the scaled design, which needs the rank `needed`.
+
+    Directions dominated by noise, with variances `v` of the readings `m`, do not count towards the rank."""
     noise = np.sqrt(v.max() / np.mean(m**2)) * (np.sqrt(len(m)) + np.sqrt(3))
     return refusals.condition_of(scaled, needed, float(noise))
 

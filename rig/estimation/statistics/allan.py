@@ -133,7 +133,7 @@ def equivalent_dof(points: int, factor: int, noise: Noise) -> float:
 
 
 def _average_squares(phases: Sequence[Array], factor: int) -> Array:
-    """Return the Allan variance (3,) of means of `factor` readings, from all intervals that are long enough."""
+    """Return the Allan variance (3,) of means of `factor` readings, from all long enough series, summed to `phases`."""
     total, count = np.zeros(3), 0
     for phase in phases:
         if len(phase) > 2 * factor:

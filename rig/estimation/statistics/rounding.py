@@ -147,7 +147,7 @@ def _count_fractions(axis: Array, unit: float) -> Array:
 
 
 def _bound_zero_error(steps: Steps, axis: int, readings: Array) -> float:
-    """Return the standard uncertainty, in units, that readings of zero cause in a mean of truncated readings (n,).
+    """Return the standard uncertainty, in units, that zeros cause in a mean of one axis' truncated readings (n,).
 
     A truncated reading of zero is anywhere within a unit of zero. Let s be the slope of the logarithm of the density of
     readings, taken between zero's neighbours, which are three units apart. Then the mean of the readings that are cut

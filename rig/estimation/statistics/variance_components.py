@@ -324,7 +324,9 @@ def _adapt(points: Array, logs: Array, proposals: Sequence[tuple[Array, Array]])
 
 
 def _find_weights(points: Array, logs: Array, proposals: Sequence[tuple[Array, Array]]) -> Array:
-    """Return normalised weights (s,) of samples (s, k) with log-densities `logs` (s,), each drawn from a proposal."""
+    """Return normalised weights (s,) of the samples `points` (s, k), each drawn from one of `proposals`.
+
+    `logs` (s,): the logarithms of the density; a proposal: the middle, and a square root of the scale matrix."""
     densities = []
     for middle, root in proposals:
         standard = np.linalg.solve(root, (points - middle).T)

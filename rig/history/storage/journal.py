@@ -135,7 +135,7 @@ def _sha256(connection: Connection, table: Table, key: tuple[int | str, ...]) ->
 
 
 def _rows(connection: Connection, table: Table, key: tuple[int | str, ...]) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield the table's name and the values of the row with this `key`, and for a run those of its parts.
+    """Yield the table's name and the values of the row with this `key`, and for a run also of every row of its parts.
 
     Null values are left out, so that a column added later changes no hash.
     """

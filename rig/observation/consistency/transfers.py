@@ -137,8 +137,8 @@ def mean_specific_force_m_s2(interval: MotionInterval, down_m_s2: Array, extensi
 def _scatter(readings: Array, time_s: Array, motion: ArmMotion, down_m_s2: Array) -> Array:
     """Return the variance (3,) of the mean of readings (n, 3), after removal of the arm's rate and gravity.
 
-    The arm's rates at adjacent samples are also removed, because a sensor's filter combines them. A ripple above half
-    the data rate counts as noise.
+    `down_m_s2` (3,) is gravity in the frame of the base. The arm's rates at adjacent samples are also removed, because
+    a sensor's filter combines them. A ripple above half the data rate counts as noise.
     """
     step_s = median_step(time_s)
     rates = [motion.rates_at_samples(time_s + shift * step_s) for shift in FILTER_SAMPLES]

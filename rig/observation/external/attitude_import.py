@@ -268,7 +268,7 @@ def _is_covered(rows_s: Array, time_s: Array) -> NDArray[np.bool_]:
 
 
 def _list_omitted(rows: _ReferenceRows, kept: _ReferenceRows, reason: str) -> Iterator[Omitted]:
-    """Yield an entry for the rows that are not `kept`, if any."""
+    """Yield one entry, with the `reason`, for all rows that are not `kept`; nothing if all are kept."""
     if lost := np.setdiff1d(rows.numbers, kept.numbers).tolist():
         window = rows.windows[rows.numbers.tolist().index(lost[0])]
         yield Omitted("rows", len(lost), len(rows.windows), reason, f"row {lost[0]}, from {window.start_s:.10g} s")

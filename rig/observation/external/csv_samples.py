@@ -135,7 +135,9 @@ def _read(path: Path, table: CsvTable, quantity: Quantity) -> NDArray[np.bool_]:
 def _drop_blanks(
     path: Path, table: CsvTable, read: Mapping[Quantity, NDArray[np.bool_]], wanted: Sequence[Quantity]
 ) -> SampleTable:
-    """Return the rows that hold all `wanted` quantities. Raise Refused `blank_cells` if some rows hold only some."""
+    """Return the rows that hold all `wanted` quantities. Raise Refused `blank_cells` if rows hold only a part of these.
+
+    `read`: for each quantity, a mask of the rows that hold it."""
     columns, time_s = dict(table.columns), table.columns[TIME]
     if not wanted or all(read[quantity].all() for quantity in read):
         kept = np.ones(len(time_s), dtype=np.bool_)

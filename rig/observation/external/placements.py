@@ -134,7 +134,7 @@ def _closed_slice(time_s: Array, window: Window) -> NDArray[np.intp]:
 def _join_rests(
     time_s: Array, readings: Mapping[Quantity, Array], rests: Sequence[Window], dwells: Sequence[Window]
 ) -> list[tuple[Window, ...]]:
-    """Return the rests, joined across a knock if the readings before and after agree and the body has not turned."""
+    """Return the rests in groups: one group across a knock if the readings agree before and after, without a turn."""
     joined: list[tuple[Window, ...]] = []
     for rest in rests:
         if joined and _same_rest(time_s, readings, joined[-1][-1], rest, dwells):
@@ -173,7 +173,7 @@ def _same_rest(
 
 
 def _reads_alike(read: Array, quantity: Quantity, before: NDArray[np.intp], after: NDArray[np.intp]) -> bool:
-    """Return whether two parts of readings (n, 3) at rest have the same mean within their noise."""
+    """Return whether the parts `before` and `after` of readings (n, 3) at rest have the same mean within the noise."""
     one, other = read[before], read[after]
     noise = np.maximum(np.minimum(one.std(axis=0), other.std(axis=0)), MIN_SCATTER_FRACTION * quantity.steady)
     tolerance = quantity.steady + MAX_NOISE_STDS * noise * np.sqrt(1 / len(one) + 1 / len(other))

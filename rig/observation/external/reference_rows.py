@@ -106,7 +106,9 @@ def _find_rate_rad_s(attitudes: Array, times_s: Array) -> float:
 
 
 def _find_still(turning: Turning, clock_s: float) -> NDArray[np.bool_]:
-    """Return a mask (N,) of rows in which the body lay still: long rows with equal means and only noise."""
+    """Return a mask (N,) of rows in which the body lay still: long rows with equal means and only noise.
+
+    `clock_s` converts the rows' times to those of the readings."""
     rows_s = turning.rows_s
     start, end = np.searchsorted(turning.time_s, rows_s.T + clock_s)
     still: NDArray[np.bool_] = (rows_s[:, 1] - rows_s[:, 0] >= MIN_STILL_S) & (end - start >= MIN_STILL_SAMPLES)

@@ -47,7 +47,7 @@ class _Pairs:
 
 
 def find_start(turning: Turning) -> RobustStart:
-    """Return initial values of matrix, bias and clock; by default those of an aligned sensor on the same clock."""
+    """Return initial values of matrix, bias and clock; if none fit, those of an aligned sensor on the same clock."""
     aligned = RobustStart(DriftState(np.eye(3), np.zeros(3), 0.0), 1.0)
     pairs = _find_pairs(turning)
     if len(pairs.begin_s) < MIN_PAIRS:

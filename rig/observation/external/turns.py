@@ -126,7 +126,7 @@ def _find_other_bias(
 ) -> Iterator[Window]:
     """Yield the pauses in which the body lies still but the bias had changed: the readings are quiet, but not near 0.
 
-    `rates` (n, 3) are the readings minus the usual bias.
+    `rates` (n, 3) are the readings minus the usual bias; `lying` as in `find_rests`.
     """
     middles = [
         Window(pause.start_s + (pause.end_s - pause.start_s) / 4, pause.end_s - (pause.end_s - pause.start_s) / 4)

@@ -110,7 +110,7 @@ def describe(sweep: Sweep) -> str:
 
 
 def arm_states_lost(where: str, extent: str) -> Fault:
-    """Return the error for a sweep with too many states missing."""
+    """Return the error for a sweep with too many states missing; `extent` says how many, or for how long."""
     return Fault(
         "arm_states_lost",
         f"in {where} the arm's states are missing {extent}",

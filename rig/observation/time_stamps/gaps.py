@@ -53,7 +53,7 @@ def _hidden_rad(time_s: Array, readings: Array, turned: Array, gap: int) -> floa
 def _bridge(time_s: Array, readings: Array, turned: Array, lasts_s: float) -> tuple[float, float] | None:
     """Return the RMS error of interpolating over `lasts_s`, and the largest change of the rate during that time.
 
-    Return None for too few readings.
+    `turned` is the integral of the readings. Return None for too few readings.
     """
     end = np.searchsorted(time_s, time_s + lasts_s * (1 - 1e-9))
     start = np.flatnonzero(end < len(time_s))

@@ -166,7 +166,7 @@ class Broadcast:
             await asyncio.sleep(FRAME_S / 4)
 
     async def frames(self, *, has_token: bool = True) -> AsyncGenerator[bytes, None]:
-        """Yield the frames for one browser: the complete state, then changes."""
+        """Yield the frames for one browser, with or without the token: the complete state, then changes."""
         mailbox = Mailbox()
         self._mailboxes[mailbox] = has_token
         if self._closing:

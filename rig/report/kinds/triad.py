@@ -107,7 +107,7 @@ def attitude_lines(finding: Finding[Any]) -> Iterator[str]:
 
 
 def method_lines(entry: Any, quantity: Quantity, from_what: str = "") -> Iterator[str]:
-    """Yield a line for each other method: its solution, or the reason why it has none."""
+    """Yield a line for each other method, named with the suffix `from_what`: its solution, or why it has none."""
     for method, other in entry.other_methods.items():
         if isinstance(other, ErrorEntry):
             yield f"{method}{from_what}: {other.error}"

@@ -24,7 +24,7 @@ class Reason:
 
 
 def reason_of(certificate: "Certificate", anchor: tuple[int, str] | None) -> Reason:
-    """Return the reason to sign a certificate: its marks, such as "Simulated laboratory …", and its number."""
+    """Return the reason to sign a certificate: its marks (such as "Simulated laboratory …"), number, and `anchor`."""
     sentences = [*certificate.marks, f"{certificate.title} {certificate.number}"]
     if anchor is not None:
         sentences.append(f"Signed after the history's journal entry {anchor[0]}, SHA-256 {anchor[1]}")

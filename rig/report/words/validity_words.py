@@ -62,7 +62,7 @@ def label_source(use: str) -> str:
 
 
 def speed_words(sensor: GyroscopeEntry) -> str:
-    """Return the speeds of the sweeps, °/s, in both directions."""
+    """Return the speeds of the sweeps, °/s, as text, with ± because each speed has both directions."""
     return ", ".join(f"±{DEG * speed:.1f}" for speed in sensor.speeds_rad_s)
 
 

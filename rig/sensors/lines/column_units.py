@@ -54,7 +54,7 @@ def _choose_rate_unit(values: Array, still: NDArray[np.bool_]) -> tuple[dict[str
 
 
 def compare_stated(kind: str, stated: str, values: Array, still: NDArray[np.bool_]) -> tuple[dict[str, Any], str]:
-    """Return the unit that the heading states, and a sentence if an accelerometer's norm at rest contradicts it."""
+    """Return the `stated` unit, or the right one and a sentence if an accelerometer's norm at rest contradicts it."""
     level = _measure_rest(values, still)
     fitting = [unit for unit, size in GRAVITY_BY_UNIT.items() if abs(level / size - 1) < GRAVITY_TOLERANCE]
     if kind == "a" and fitting and UNITS[stated] not in map(UNITS.get, fitting):  # m/s² is m/s2

@@ -20,8 +20,8 @@ def listen(
 ) -> tuple[int, list[TimedLine], float]:
     """Return the baud rate, the lines, and the time at which the rest ended, s, on the clock of their arrival.
 
-    `tell` receives the instructions for the operator. Raise SensorError `no_port`, `lines_silent`,
-    `lines_wrong_baud_rate`, `lines_link_lost`.
+    `seconds`: the durations of the rest and of the turning after it; `tell` gets the operator's instructions. Raise
+    SensorError `no_port`, `lines_silent`, `lines_wrong_baud_rate`, `lines_link_lost`.
     """
     speed = baud or _find_speed(port, tell)
     still_s, turned_s = seconds
@@ -49,7 +49,7 @@ def listen(
 
 
 def _find_speed(port: str, tell: Callable[[str], None]) -> int:
-    """Return the first usual baud rate at which the input is text. Raise SensorError `lines_wrong_baud_rate`."""
+    """Return, and `tell`, the first usual baud rate with text as input. Raise SensorError `lines_wrong_baud_rate`."""
     if port.startswith("socket://"):
         return USUAL_BAUDS[0]  # a socket has no baud rate
     has_input = False

@@ -124,7 +124,7 @@ def _read_parameters(document: Mapping[str, Any], firmware: int) -> dict[str, Au
 
 
 def _write(path: Path, text: str, *, exclusive: bool) -> None:
-    """Write a file atomically; return once it is on the disk."""
+    """Write a file atomically; return once it is on the disk. If `exclusive`, raise FileExistsError if it exists."""
     if exclusive and path.exists():
         raise FileExistsError(17, "there is such a file already")
     new = path.with_name(f".{path.name}.{os.getpid()}")

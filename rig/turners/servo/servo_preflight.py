@@ -38,7 +38,7 @@ def servo_problems(report: ServoReport, wanted_model: str, carried: FlangeLoad, 
 
 
 def _identity(report: ServoReport, wanted_model: str) -> list[Problem]:
-    """Return the problems of another model than the configured one, or of firmware too old."""
+    """Return a problem if the servo is not of the configured model, and one if its firmware is too old."""
     problems = []
     if report.servo.name != wanted_model:
         problems.append(

@@ -274,7 +274,7 @@ class JointMotion:
         self._play(trajectory, scaled=True)
 
     def speed(self, qd_rad_s: Joints, acceleration_rad_s2: float) -> None:
-        """Play a speedJ from the joints' present state: accelerate to this velocity and keep it."""
+        """Play a speedJ from the joints' present state: accelerate to `qd_rad_s` (6,) and keep this velocity."""
         wanted = tuple(max(-m, min(m, v)) for v, m in zip(qd_rad_s, self.speed_limit_rad_s, strict=True))
         velocity = self._trajectory.state_at(self._trajectory_s)[1]
         self._play(plan_speed_change(self.now.target_q_rad, velocity, wanted, acceleration_rad_s2), scaled=True)
