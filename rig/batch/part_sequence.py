@@ -92,7 +92,7 @@ class Work:
         self._write_table()
 
     def _begin_next(self) -> BatchPart | None:
-        """Enter and return the next part; None if none follows."""
+        """Enter the next part in the journal and return it; None if no part follows."""
         why = ""
         while (serial := self.operator.next_part(self.journal.batch.parts, why)) is not None:
             doubt = doubt_of(serial, self.journal.batch, self.section, self.bench.today)
@@ -107,7 +107,7 @@ class Work:
         return None
 
     def _carry_out(self, part: BatchPart) -> None:
-        """Measure the part, and enter its end; after each error, measure again if the operator agrees.
+        """Measure the part, and enter the outcome in the journal; after an error, measure again if the operator agrees.
 
         Pass on a Fault if no operator attends.
         """
@@ -125,7 +125,7 @@ class Work:
                     return self._end_part(PartEnded(outcome, now_utc(), f"{error.name}: {error.what}"))
 
     def refuse_same_chip(self, part: BatchPart, chip: Chip) -> None:
-        """Raise Refused `same_chip` if another serial number had this chip, unless the operator confirms it."""
+        """Raise Refused `same_chip` if the chip had another serial number before, unless the operator goes on."""
         if not self.section.own_board:
             return
         other = self.journal.batch.same_chip(chip, part.serial)

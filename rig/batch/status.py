@@ -88,7 +88,7 @@ class Present:
 
     @contextmanager
     def asking(self, what: str) -> Iterator[None]:
-        """Show during the block that the operator is asked between two runs."""
+        """Show during the block that the operator is asked a question between two runs; `what`: its subject."""
         self._becomes(replace(self.now, state="asking", doing=what, left_s=None))
         yield
         self._becomes(replace(self.now, state="checking" if self.now.part else "waiting", doing=""))

@@ -22,7 +22,7 @@ def note_own(*texts: str) -> None:
 
 
 def is_own(sha256: str) -> bool:
-    """Return whether this user has run the text with this hash (hexadecimal) on this computer."""
+    """Return whether this user has run the configuration or script of this hash (hexadecimal) on this computer."""
     with suppress(Refused):
         return len(sha256) == 64 and sha256.isalnum() and (_folder() / sha256).is_file()
     return False

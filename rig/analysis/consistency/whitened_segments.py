@@ -54,7 +54,7 @@ class WhitenedSegments:
         return orthonormal_basis(self.model)
 
     def chi_square_of(self, alternatives: Sequence[Array], nuisance: Sequence[Array]) -> list[float]:
-        """Return the χ² of each alternative (3, N, k), as `WhitenedModel` defines it."""
+        """Return the χ² of each alternative (3, N, k), with the columns `nuisance` added to the model."""
         basis = self._extend_basis(nuisance)
         return [
             chi_square_of(self.readings, basis, apply_whitener(self.whitener, columns))[0] for columns in alternatives

@@ -308,7 +308,7 @@ def _solve_attitudes(
 
 
 def _gyroscope(item: Item, result: Result, clock: TimeBase | None) -> SensorResult:
-    """Return a gyroscope's `result` in attitudes in the form of a calibration from sweeps."""
+    """Return a gyroscope's `result`, obtained in attitudes, in the form of a calibration from sweeps."""
     solution = _describe_as_swept(result)
     if clock is not None and isinstance(result, IncrementCalibration):
         clock = clock.correct(-result.solution.clock_s, result.solution.clock_std_s)

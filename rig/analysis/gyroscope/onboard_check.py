@@ -145,7 +145,7 @@ def _events(run: RunData, sensor: str) -> Iterator[BoardEvent]:
 
 
 def _count_missing(sequence: NDArray[np.uint32]) -> int:
-    """Return the number of values missing in a sequence modulo 2³²."""
+    """Return how many numbers are missing in `sequence`, which counts modulo 2³²."""
     return int(np.sum(np.diff(sequence).astype(np.int64) - 1))
 
 

@@ -158,7 +158,7 @@ def add_errors(
     *,
     settings: RunSettings,
 ) -> Movement:
-    """Return the movement with the modelled errors of the sensor and of the arm in these windows."""
+    """Return the movement together with the modelled errors of the sensor and of the arm in `windows`."""
     sensor_errors = list_sensor_errors(datasheet, windows, sensor.unseen_change_k, second_order=settings.second_order)
     rotations = list_arm_rotations([window.posture for window in windows], arm, np.array(sensor.mounting))
     return replace(movement, sensor_errors=sensor_errors, arm_turns=rotations)

@@ -89,7 +89,7 @@ def show(options: Namespace) -> int:
 
 
 def _find_shown(history: History, named: str) -> list[Past]:
-    """Return the calibration with the number `named`, or the calibrations in the last run of that serial number.
+    """Return the calibration with the number `named` or, if `named` is a serial number, those in its last run.
 
     Raise Refused `not_in_history`.
     """

@@ -140,7 +140,7 @@ def _last_rest(row: Factor) -> int:
 
 
 def solve_step(rows: Sequence[Factor]) -> tuple[Array, Array]:
-    """Return the least-squares step (p,) of the rows, and its covariance (p, p)."""
+    """Return the least-squares step (p,) of the unknowns for the equations `rows`, and its covariance (p, p)."""
     design, residual = whiten_rows(rows)
     size = np.linalg.norm(design, axis=0)
     scaled = design / size

@@ -297,7 +297,7 @@ def index_coefficients(columns: int) -> tuple[NDArray[np.intp], NDArray[np.intp]
 
 
 def _all_variances(variances: Array, speed_noise: Array | None, shared: Array | None) -> Array:
-    """Return the variances (N, 3) of the means from noise, `speed_noise` (N, 3) and `shared` covariance (N, N)."""
+    """Return the total `variances` (N, 3) of the means, including `speed_noise` (N, 3, std) and `shared` (N, N)."""
     of_speed = 0.0 if speed_noise is None else speed_noise**2
     common = 0.0 if shared is None else np.diag(shared)[:, None]
     total: Array = variances + of_speed + common

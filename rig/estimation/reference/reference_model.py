@@ -88,7 +88,7 @@ def jacobian(theta: Array, attitudes: Array, v_bar: Array) -> Array:
 
 
 def free_directions(theta: Array, *, norm_known: bool) -> Array:
-    """Return the free directions (…, p, q) of `theta`: q = p, or p − 1 if the reference keeps its given norm."""
+    """Return the directions (…, p, q) in which `theta` may change: q = p, or p − 1 if the reference's norm is given."""
     p = theta.shape[-1]
     free = np.zeros((*theta.shape[:-1], p, p))
     free[...] = np.eye(p)

@@ -220,7 +220,7 @@ def _check_size(m: Array, norm: float) -> None:
 
 
 def _check_scale(scale: Array, m: Array, prior: ReferencePrior) -> None:
-    """Raise Fault `wrong_unit` for an implausible scale factor (3,), or `attitude_untrustworthy`.
+    """Raise Fault `wrong_unit` or, if the units are right, `attitude_untrustworthy`, for an implausible scale (3,).
 
     If the readings (N, 3) of every axis reach from about minus to plus a known norm, their units are right.
     """

@@ -127,7 +127,7 @@ def _twice_integrated_logarithm(x: Array) -> Array:
 
 
 def _flicker(instability_rad_s: float, windows_s: ArrayLike) -> Array:
-    """Return the covariance (N, N) of flicker noise of a given Allan deviation."""
+    """Return the covariance (N, N) of means over windows (N, 2) of flicker noise with the given Allan deviation."""
     covariance: Array = instability_rad_s**2 * flicker_covariance(windows_s)
     return covariance
 

@@ -69,7 +69,7 @@ def _margin_s(window: Window) -> float:
 
 
 def _rest(time_s: Array, rates: Array, acceleration: Array | None, window: Window) -> HandRest:
-    """Return the rest in a window: means and standard deviations, without a margin at both ends."""
+    """Return the rest in a window: means and standard deviations, for which a margin at either end is left out."""
     start_s, end_s = window.start_s + _margin_s(window), window.end_s - _margin_s(window)
     inside = (time_s >= start_s) & (time_s <= end_s)
     forces = None if acceleration is None else acceleration[inside]

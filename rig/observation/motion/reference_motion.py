@@ -16,7 +16,7 @@ class RateFunction(Protocol):
     """A function of times (n,): rates (n, 3), rad/s, or their derivative if `derivative` is 1."""
 
     def __call__(self, time_s: Array, derivative: int = 0, /) -> Array:
-        """Return the rates or their derivative."""
+        """Return the rates (n, 3) at the times (n,), or their derivative if `derivative` is 1."""
         ...
 
 

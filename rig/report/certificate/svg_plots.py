@@ -42,7 +42,7 @@ class UprightAxis:
         return cls(1.1 * float(reach), unit)
 
     def height(self, value: float) -> float:
-        """Return the height of a value in SI units, in pixels."""
+        """Return the height, in pixels, of a value in SI units."""
         return round(TOP + HEIGHT / 2 * (1 - value / self.unit.size / self.reach), 1)
 
     @property

@@ -12,7 +12,7 @@ QUANTITIES = ("scale factors", "biases")
 
 
 def factor_note(budget: BudgetEntry) -> str:
-    """Return the note on U: the coverage factor k, if it is the same for all values, or where k is stated."""
+    """Return the note on U: the coverage factor k, if it is the same for all values, or else that k is stated below."""
     printed = {f"{factor:.2f}" for factor in budget.coverage_factors}
     return f"k\u00a0=\u00a0{_short(printed.pop())}" if len(printed) == 1 else "k as stated below"
 

@@ -183,7 +183,7 @@ def _counts(plan: Plan) -> str:
 
 
 def _limits_table(what: str, by_sensor: "Mapping[str, Sequence[DetectionLimit]]") -> Table:
-    """Return a table with a row for each fault and a column for each sensor; the heading names `what` has the fault.
+    """Return a table with a row for each fault and a column for each sensor; the faults' heading is "fault of `what`".
 
     A dash means that no check of the sensor detects the fault.
     """

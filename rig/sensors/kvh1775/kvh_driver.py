@@ -152,7 +152,7 @@ class Kvh1775:
         return SensorError("no_kvh", f"{self._where}: nothing came within {self._patience.first_s:g} s", _CABLE)
 
     def _ask(self, command: str, name: str) -> str:
-        """Return the answer's text after `name`. Raise SensorError `kvh_command_refused`, `kvh_link_lost`."""
+        """Send `command`; return the answer after `name`. Raise SensorError `kvh_command_refused`, `kvh_link_lost`."""
         answer = re.compile(rb"%s,([^\r\n]*)[\r\n]" % re.escape(name.encode()))
         for wait_s in self._patience.attempts():
             with self.own_port.news:

@@ -52,7 +52,7 @@ def simplify_heading(layout: TableLayout, index: int) -> str:
 
 
 def _find_kind(words: Sequence[str], unit: str) -> str:
-    """Return the kind of sensor of a heading from its `unit` or, without one, its `words` but the axis; "" if unknown.
+    """Return the kind of sensor of a heading from its `unit` or, if that shows nothing, its `words`; "" if unknown.
 
     The unit decides first, because fx_uT is a field, not a force.
     """

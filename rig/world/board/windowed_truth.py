@@ -71,7 +71,7 @@ class SimulatedTruth:
         return readings(quiet, time_s, np.full((len(time_s), 3), rate_rad_s), self._seed(name), sensor.temperature_c)
 
     def _accelerations(self, name: str, windows_s: Windows, force_m_s2: float) -> np.ndarray:
-        """Return the readings (n, 3) of the accelerometer without noise or axis errors, at a force along every axis."""
+        """Return readings (n, 3) of the accelerometer without noise or axis errors, at equal forces along all axes."""
         sensor, time_s = self._sensor(name), _instants(windows_s)
         if sensor.accelerometer is None:
             raise ValueError(f"nothing reads the accelerometer of {name}")

@@ -168,7 +168,7 @@ class _Child:
             self.abandon()
 
     def watch_parent(self) -> None:
-        """Stop the arm if the parent is silent for too long, so that nothing supervises the arm.
+        """Stop the arm if the parent, which supervises it, is silent for too long.
 
         The watch needs a thread of its own, because sending states to a parent that does not read them finally blocks.
         """
@@ -285,7 +285,7 @@ class _Child:
             self.send(RequestFailed(move_failure("the controller did not start the move")))
 
     def _await_state(self) -> None:
-        """Wait for a new state. If no state comes, the move did not begin because the link is lost.
+        """Wait for a new state. If none comes, the link is lost, and so the move did not begin.
 
         The parent then reports the lost link before this wait ends.
         """
