@@ -79,7 +79,7 @@ class Characteristic:
 
     @property
     def parameters(self) -> dict[str, str]:
-        """The words for the parameters as which a history stores the characteristic, by name; empty without `series`."""
+        """The words for the parameters that a history stores for it, by parameter name; empty without `series`."""
         if self.series is None:
             return {}
         return {self.series.prefix + label: self.series.words.format(*label) for label in self.labels}
