@@ -46,7 +46,8 @@ MISREADING_FAULTS = {"wrong_axis", "wrong_sign", "wrong_unit"}  # a stuck sensor
 class Observation:
     """One revolution, or one arc of a joint, averaged.
 
-    - sweep: index of the sweep in the plan; joint_name, direction: of the joint's turn, None in external data.
+    - sweep: index of the sweep in the plan, in external data the row's number, from 1.
+    - joint_name, direction: of the joint's turn, None in external data.
     - axis ("x", "y", "z"), sign: the sensor axis that is nominally along the turn.
     - axis_flange (3,), speed_rad_s: direction, in the flange's frame, and size of the arm's mean rate, which is
       weighted like the mean reading; the size is nominally 2π/T or Δθ/T.

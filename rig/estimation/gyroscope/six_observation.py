@@ -76,7 +76,7 @@ def solve_by_algorithm_1(p: Array, q: Array) -> tuple[Array, int]:
     """Return the module's β (6,) and the number of passes by the paper's Algorithm 1, as published.
 
     β ← (XᵀX)⁻¹Xᵀ(ω² − γ) = p − γ q and γ ← Γ(β), beginning with γ = 0, until Σ|Δβ| ≤ 10⁻⁶; the first β is pass 1. Each
-    pass shrinks the step by β0 / (ω² − β0), so it converges only for β0 < ω²/2 (at 1 rad/s this is the paper's "β0 <
+    pass shrinks the step by β0 / (ω² − β0), so convergence needs β0 < ω²/2 (at 1 rad/s this is the paper's "β0 <
     0.5"). Raise Fault `algorithm_1_diverged` as soon as a step grows.
     """
     beta, last_change = p, np.inf

@@ -181,9 +181,9 @@ def bias_process(
     """Return the bias drift that explains mean readings (N, 3) = `design` (N, p) × parameters + drift + noise.
 
     `variances_rad2_s2` (N, 3) are the variances of the noise, `windows_s` (N, 2) the averaging windows. The three axes
-    have one process, since few averages determine it. `shared_rad2_s2` (3, N, N) are covariances between the averages
-    in addition to their noise, `instability_rad_s` is the data sheet's bias instability, zero if unknown. `chosen`
-    selects random walk and scatter by their likelihood.
+    share one process, because the averages are too few to determine three. `shared_rad2_s2` (3, N, N) are covariances
+    between the averages in addition to their noise, `instability_rad_s` is the data sheet's bias instability, zero if
+    unknown. `chosen` selects random walk and scatter by their likelihood.
     """
     z, means, variances = (np.asarray(a, dtype=np.float64) for a in (design, means_rad_s, variances_rad2_s2))
     dof = 3 * (len(z) - z.shape[1])

@@ -40,7 +40,7 @@ class RepeatedMeans:
 class TemperatureFit:
     """One fit: the coefficients of (T − reference)ⁿ for n = 1 to 3 (rows) and each axis (columns).
 
-    `relative` (3, 3): those of the scale factors k, as fractions of k at the reference; `bias` (3, 3): those of c.
+    `relative` (3, 3): those of the scale, as fractions of the scale at the reference; `bias` (3, 3): those of the bias.
     `covariance` (18, 18) includes the effect of the fitted lag, `without_lag` (18, 18) does not. `loop`: hysteresis
     (6,) of scale and bias, and its standard deviation; None unless the sensor was both warmed and cooled.
     """

@@ -67,7 +67,8 @@ class ExternalData:
 
     - `at_reference`: whether polynomials have corrected the means to one temperature. The polynomials' uncertainty then
       includes the differences between repeated measurements, so checks of these differences are omitted.
-    - `by_mean`: numbers of rows solved from the mean speed, not the angle, because the body moved before or after.
+    - `by_mean`: the numbers, from 1, of rows solved from the mean speed, not the angle, because the body moved before
+      or after.
     - `omitted`: rows left out for missing readings, and the readings that are missing in the other rows.
     - `change`: an abrupt change of the gyroscope that the rows show.
     """
