@@ -109,7 +109,7 @@ def observe_run(
 
 
 def observe_runs(runs: Sequence[RunData], corrections: Mapping[int, Array] = NO_ROTATIONS) -> tuple[ObservedRun, ...]:
-    """Return the observations of each recording with a finished sweep or dwell; a repeated step is used as last done.
+    """Return the observations of each recording with a finished sweep or dwell; of a repeated step the last is used.
 
     The first recording's thresholds apply to all. `corrections` contains, for a stage of the procedure, the
     `correction` of `observe_run`. Raise as `turner_of` does, and Fault as `observe_run` does.

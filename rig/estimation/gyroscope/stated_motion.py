@@ -79,7 +79,7 @@ class MotionErrors:
         return _median(self.rate**2, self.weights), _median(self.axis_rad**2, self.weights)
 
     def expanded(self, fixed: Array, of_rate: Array, of_axis: Array) -> Array:
-        """Return the expanded uncertainties U (q,), at 95.45 %, of q values, over all pairs of standard deviations.
+        """Return the expanded uncertainties U (q,), at 95.45 %, of q values, for the pairs of stds by their weights.
 
         For a given pair the values have a normal distribution. `fixed` (q,) are the variances that do not depend on the
         pair, `of_rate` and `of_axis` (q,) the variances for `rate` = 1 and `axis_rad` = 1.

@@ -34,7 +34,7 @@ def well_timed(states: NDArray[Any]) -> NDArray[Any]:
 
 
 def fit_lines(time_s: Array, q_rad: Array) -> tuple[Array, Array, Array]:
-    """Fit straight lines to readings (m, n) in k windows; return their middle times (k,), angles and rates (k, n)."""
+    """Fit lines to angles (m, n) in k windows; return the windows' middles (k,), and angles and rates (k, n) there."""
     count = max(MIN_ANGLES, round(SMOOTHING_S / median_step(time_s)))
     half = count // 2
     windows = np.lib.stride_tricks.sliding_window_view

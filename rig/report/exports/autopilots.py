@@ -95,7 +95,7 @@ def _lines(
 
 
 def _number_imus(calibrations: ExportedCalibrations) -> dict[str, int]:
-    """Return the number of each IMU; the first is 0."""
+    """Return the number of each IMU, counted from 0 in the order of the calibrations, by the sensor's name."""
     names = dict.fromkeys(sensor.sensor for sensor in calibrations.sensors if sensor.quantity in IMU)
     return {name: i for i, name in enumerate(names)}
 

@@ -73,7 +73,7 @@ def _divide_axis(words: list[str]) -> list[str]:
 
 
 def _strip_units(words: list[str]) -> list[str]:
-    """Return a heading's words up to the axis, without a unit behind it; a bare axis gets the sensor of its unit."""
+    """Return a heading's words up to the axis, without its unit; before a bare axis put the sensor with this unit."""
     axes = [position for position, word in enumerate(words) if word in AXES]
     if axes and axes[-1] < len(words) - 1 and all(word in UNIT_WORDS for word in words[axes[-1] + 1 :]):
         kind = {"rad": "gyro", "deg": "gyro", "dps": "gyro", "m": "acc", "t": "mag", "ut": "mag"}.get(
