@@ -122,7 +122,7 @@ def _accelerations(run: RunData, recorded: Mapping[str, _RecordedPart]) -> Attem
 
 
 def _fields(run: RunData, recorded: Mapping[str, _RecordedPart]) -> Attempts[QuantityInDwell, ReadAtRest]:
-    """Return the means of magnetometers in the dwells of an accelerometer on the same clock."""
+    """Return each magnetometer's mean in each dwell of an accelerometer on the same clock, or the dwell's Fault."""
     expected_t = run.settings.site.magnetic_field_t
     fields: Attempts[QuantityInDwell, ReadAtRest] = Attempts()
     for name in run.measuring(FIELD):

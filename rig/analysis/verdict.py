@@ -73,7 +73,7 @@ class _LimitSet:
         std: Array,
         uncertainties: tuple[ExpandedUncertainty | None, ExpandedUncertainty | None],
     ) -> tuple[Check, ...]:
-        """Return the checks of scale and bias, (3,) each, and of their standard deviations (6,)."""
+        """Return the checks of scale and bias, (3,) each with its expanded uncertainty, and of their `std` (6,)."""
         return (
             self.nearest("scale_deviation", scale - 1, uncertainties[0]),
             self.check("scale_std", _largest_magnitude(std[:3])),

@@ -25,7 +25,10 @@ class Absent:
     bits: int = 0
 
     def mask_provided(self, values: ArrayLike, flags: ArrayLike = -1) -> NDArray[np.bool_]:
-        """Return a mask of the values (n,) or (n, 3) that the source provided, by the messages' `flags` (n,) if any."""
+        """Return a mask of the values (n,) or (n, 3) that the source provided; `flags` (n,) are those of the messages.
+
+        Without flags, −1 stands for all fields being flagged as provided.
+        """
         numbers = np.asarray(values, dtype=np.float64)
         low, high = self.within
         valid = np.isfinite(numbers) & ~np.isin(numbers, self.numbers) & (numbers >= low) & (numbers <= high)

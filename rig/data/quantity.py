@@ -109,7 +109,7 @@ class Quantity:
 
     @property
     def parameter_signs(self) -> tuple[float, ...]:
-        """The signs of scale factors, then of biases, as compared with a model whose bias is part of the reading."""
+        """The signs (1 or −1) of scale factors, then biases, relative to a model whose bias is part of the reading."""
         return (1.0,) * len(self.axes) + (float(self.offset),) * len(self.axes)
 
 

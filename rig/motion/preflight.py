@@ -1,4 +1,4 @@
-"""The pre-flight check of a plan for any turner: its problems. Pure functions."""
+"""The pre-flight check of a plan for any turner, which finds the plan's problems. Pure functions."""
 
 import math
 

@@ -11,7 +11,7 @@ MAX_RANGE_RATIO = 2.0  # a part may exceed its range, but not twice
 
 
 def convert_own_readings(readings: ArrayLike, quantity: Quantity, limit: float | None, whose: str) -> Array:
-    """Return readings as an array (n, 3), float64.
+    """Return readings as an array (n, 3), float64; `whose` is the sensor in messages.
 
     `limit` is the sensor's nominal range in SI, None if unknown. Raise Refused `not_readings` for whole numbers, which
     are counts, and for other shapes. Raise `wrong_unit` for numbers beyond the sensor's range, and for accelerations

@@ -55,9 +55,9 @@ class ObservedRun:
     def time_s(self, sensor: str, gyroscope: str | None = None) -> Array:
         """Return the times (n,) of all samples of a sensor on the arm's clock.
 
-        The time base of `gyroscope` converts the times; by default the sensor's own does, or if the sensor has none,
-        that of the first gyroscope on the same clock. Without a time base, arrival times at the computer relate samples
-        to arm states, to within milliseconds.
+        The time base of `gyroscope` converts the times. The default is the sensor's own time base or, without one, the
+        time base of the first gyroscope on the same clock. If there is none at all, arrival times at the computer
+        relate samples to arm states, to within milliseconds.
         """
         bases = {name: observations.time_base for name, observations in self.sensors.items()}
         return times_s(self.run, sensor, bases, gyroscope)

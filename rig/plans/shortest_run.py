@@ -288,7 +288,7 @@ class _HandSearch:
         return [self._candidate(*numbers) for numbers in product(FLIP_COUNTS, TURN_COUNTS, RESTS_S[:4])]
 
     def select_endless(self, candidates: Sequence[Candidate]) -> Sequence[Candidate]:
-        """Return the candidate with the most flips, fewest turns and shortest rests: without noise it is the best."""
+        """Return only the candidate with the most flips, fewest turns and shortest rests, the best without noise."""
         return [max(candidates, key=lambda candidate: (candidate.sizes[0], -candidate.sizes[1], -candidate.sizes[2]))]
 
     def finer(self, best: Candidate) -> Sequence[Candidate]:

@@ -28,9 +28,9 @@ class Row:
 
 
 def _row(*classes: str, same: str = "", **renamed: str) -> Row:
-    """Return the row of `classes`.
+    """Return the row of `classes`, whose attributes fill the fields of an entry.
 
-    `same` lists the fields whose attributes have the same name; `renamed` has the other attributes, by field.
+    `same` lists the fields that have the attribute's name; `renamed` has the attributes of other fields, by field.
     """
     return Row(classes, {**{name: name for name in same.split()}, **renamed})
 

@@ -53,7 +53,7 @@ class Connector:
 
     - `results`: the calibrations of the previous phase, by sensor name.
     - `memory`: the sensors' earlier calibrations.
-    - `connecting`: the function that connects the turner; None for that of the turner's kind.
+    - `connecting`: the function that connects the turner; None for the function of the turner's kind.
     """
 
     phase: Phase
@@ -74,7 +74,7 @@ class Connector:
 
     @contextmanager
     def open(self) -> Iterator[Rig]:
-        """Connect everything and start recording; yield the rig; at the end stop the turner and close the file.
+        """Connect everything and start recording; yield the rig; at the end stop the turner and close the recording.
 
         Nothing moves. Raise Refused if the turner, the board or a sensor differs from the configuration or from the
         recording so far, or if a sensor lacks the calibration for its corrected readings.

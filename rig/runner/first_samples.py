@@ -14,8 +14,8 @@ class FirstSamples:
     """The wait for first samples, measured as the number of polls times the interval `look_s`.
 
     Elapsed time would be too strict, because the threads that poll and read samples may be delayed. If the turner's
-    clock shows a shorter wait, that one counts: a simulated turner's clock stops if its world is late. The limit grows
-    with the load of this computer, on which the simulated laboratory may run.
+    clock shows a shorter wait, this shorter wait counts, because a simulated turner's clock stops if its world is late.
+    The limit grows with the load of this computer, on which the simulated laboratory may run.
     """
 
     look_s: float

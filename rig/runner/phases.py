@@ -250,7 +250,7 @@ class Run:
 
 
 def _add_notes(what: str, error: BaseException) -> str:
-    """Return the message `what` followed by the notes of the error, such as that on how the arm stopped."""
+    """Return the message `what` followed by the notes of the error, such as the note on how the arm stopped."""
     return "; ".join([what, *dict.fromkeys(_notes(error))])
 
 

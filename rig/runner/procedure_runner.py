@@ -341,7 +341,7 @@ class Rig:
         self._done.add(dwell.index)
 
     def _wait(self, until: Callable[[], bool], at_most_s: float, watch: Callable[[], None]) -> bool:
-        """Stand still until `until` returns True; return False if `at_most_s` of the controller's time has passed."""
+        """Stand still, calling `watch`, until `until` is true; return False after `at_most_s` of controller time."""
         turner = self.devices.turner
         began_s = turner.latest.time_s
         while not until():

@@ -59,7 +59,7 @@ class _RecentReadings:
 
 
 def _has_settled(ratios: Sequence[float]) -> bool:
-    """Return whether readings scatter as little as at rest, or somewhat more but no longer less from span to span.
+    """Return whether readings scatter as little as at rest, or somewhat more without a decrease from span to span.
 
     `ratios` are those of `_RecentReadings.over_rest`.
     """
@@ -73,7 +73,7 @@ def _has_settled(ratios: Sequence[float]) -> bool:
 
 
 def _is_steady(ratios: Sequence[float], spans: int, least: float) -> bool:
-    """Return whether the scatter no longer decreases: the sum of the newest ratios is near that of those before.
+    """Return whether the scatter no longer decreases: the newest ratios add up to nearly as much as those before them.
 
     `spans` is the number of ratios in either sum; `least` is the smallest ratio of the sums that counts as steady.
     """
@@ -108,7 +108,7 @@ class Settling:
                 watched.recent.clear()
 
     def learn_rest(self) -> bool:
-        """Add the present scatter to the scatters at rest; return False while there are too few."""
+        """Add the present scatter to the scatters at rest; return whether each sensor has enough scatters at rest."""
         with self._lock:
             for watched in self._watched.values():
                 if scatters := watched.find_scatters_counts(1):

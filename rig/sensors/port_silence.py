@@ -1,6 +1,6 @@
 """The silence of a sensor with a port of its own: the time for which reads of the port brought nothing.
 
-Where another instrument's clock is known, the silence is not longer than the time that passed on this clock.
+If the time of another instrument, such as the turner, is known, the silence is at most the time that passed there.
 """
 
 from dataclasses import dataclass

@@ -65,7 +65,7 @@ def _simulate_gyroscope(runs: int, rng: np.random.Generator, _: int) -> Array:
 
 
 def _solve_closed_form(x: Array, speed_rad_s: float) -> tuple[Array, Array]:
-    """Return scale factors and biases (runs, 3) for designs (runs, 6, 6) with either order of averaging."""
+    """Return scale factors and biases (runs, 3) from designs (runs, 6, 6) of squared averages or averaged squares."""
     q = np.linalg.solve(x, np.ones((*x.shape[:-1], 1)))[..., 0]
     total = np.sum(q[:, 3:] ** 2 / (4 * q[:, :3]), axis=1, keepdims=True)
     beta = speed_rad_s**2 / (1 + total) * q

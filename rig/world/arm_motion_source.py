@@ -83,7 +83,7 @@ class ArmMotionSource:
 
     @property
     def ideal(self) -> bool:
-        """Whether `rate_at` gives all that a gyroscope senses: an arm without errors on ground that does not rotate."""
+        """Whether the arm has no errors and the ground is still: `rate_at` then gives all that gyroscopes sense."""
         return self.arm.ideal
 
     def step(self) -> None:

@@ -29,7 +29,7 @@ class MotionSource(Protocol):
 
     @property
     def ideal(self) -> bool:
-        """Whether `rate_at` gives all that a gyroscope senses: a turner without errors on still ground."""
+        """Whether the turner has no errors and the ground is still: `rate_at` then gives all that gyroscopes sense."""
         ...
 
     def step(self) -> None:
@@ -45,5 +45,5 @@ class MotionSource(Protocol):
         ...
 
     def frames_at(self, time_s: float) -> Frames:
-        """Return rotation (rows) and position (m) of every body, the fixed one first, the one with the sensors last."""
+        """Return rotation matrix and position (m) of every body: the fixed body first, that with the sensors last."""
         ...

@@ -123,6 +123,6 @@ class SimulatedOperator:
         return now
 
     def frames_at(self, time_s: float) -> Frames:
-        """Return rotation (rows) and position (m) of the table and of the item."""
+        """Return the rotation matrix, row by row, and the position (m) of the table and of the item."""
         x, y, z = map(tuple, self._hand.motion_at(np.array([time_s])).attitude[0].tolist())
         return [(ORIENTATION, ORIGIN), ((x, y, z), ORIGIN)]

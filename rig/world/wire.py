@@ -123,7 +123,7 @@ class Wire:
         return max(0.0, min(due_s, max(POLL_LIMITS_S[0], waited_s / 4), POLL_LIMITS_S[1]))
 
     def _take(self, now_s: float) -> None:
-        """Record that the client has read something. If it did not read for a while, reduce the patience with it."""
+        """Record that the client has read; if it had not read for a while, reduce the patience with this client."""
         waited_s = 0.0 if self._waiting_since_s is None else now_s - self._waiting_since_s
         if waited_s > MAX_PACED_WAIT_S:
             self._slept = True

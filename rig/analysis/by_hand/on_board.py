@@ -1,4 +1,4 @@
-"""The comparison of the board's solution of a session by hand with that in double precision. Pure functions.
+"""The comparison of the board's solution of a session by hand with a solution in double precision. Pure functions.
 
 The host integrates the same readings by the same equations (`rig.estimation.by_hand.on_board`), with the rests and
 moves that the board reports, so only the arithmetic differs. The calibration's quality is not judged here.

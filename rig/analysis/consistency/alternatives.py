@@ -47,7 +47,7 @@ def _axis_patterns(columns: Array) -> Array:
 
 
 def _sweep_patterns(means: Means) -> Array:
-    """Return the patterns (3 M, N, 3) of a change on one axis during one of M sweeps."""
+    """Return the patterns (3 M, N, 3), in the N means, of a change on one axis during one of M sweeps."""
     alone = means.sweeps.T[:, None, :, None] * np.eye(3)[None, :, None, :]
     return np.asarray(alone.reshape(-1, len(means.sweep), 3), dtype=np.float64)
 

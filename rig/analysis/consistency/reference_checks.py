@@ -192,7 +192,10 @@ def _detection_limits(
 
 
 def _whiten_readings(readings: ReferenceModel, *, drifting: bool) -> WhitenedReference:
-    """Return residuals and model columns with unit noise, in coordinates in which all errors are independent."""
+    """Return residuals and model columns with unit noise, in coordinates in which all errors are independent.
+
+    If `drifting`, the model includes a drift of the bias.
+    """
     theta, movement = readings.theta, readings.movement
     decoupled = decorrelate(
         noise(theta, movement) + readings.error_patterns.T @ readings.error_patterns, effects(theta, movement)

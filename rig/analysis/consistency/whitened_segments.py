@@ -63,7 +63,10 @@ class WhitenedSegments:
     def test(
         self, columns: Array | None, nuisance: Sequence[Array], false_alarm_probability: float
     ) -> Statistic | None:
-        """Return the χ² that columns explain, and its critical value; None if the model spans the columns."""
+        """Return the χ² that columns explain, and its critical value; None if the model spans the columns.
+
+        The model is extended by the columns `nuisance`. If `columns` is None, the χ² is that of all residuals.
+        """
         whitened = None if columns is None else apply_whitener(self.whitener, columns)
         value, dof = chi_square_of(self.readings, self._extend_basis(nuisance), whitened)
         return (value, critical_value(false_alarm_probability)(dof)) if dof else None

@@ -1,6 +1,6 @@
-"""The ratio of a reference's rates to a gyroscope's readings, which shows another unit, or the end of its range.
+"""The ratio of a reference's rates to a gyroscope's readings, which shows readings in another unit or out of range.
 
-Corrected readings need not repeat one value at the end of the range, because they contain noise of the other axes.
+A repeated value does not show the end of the range if readings were corrected, because these contain other axes' noise.
 """
 
 import numpy as np

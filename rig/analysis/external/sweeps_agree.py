@@ -61,7 +61,7 @@ def _name_contradiction(worst: int, data: ExternalData) -> str:
 
 @dataclass(frozen=True, slots=True)
 class SweepErrors:
-    """The covariances that errors of the stated motion and changes of the sensor add to a solution, with `dof`.
+    """The covariances, with `dof`, that errors of the stated motion and changes of the sensor add to a solution.
 
     `covariance` (6, 6): of scale and bias; `matrix_covariance` (12, 12) and `angles_covariance_rad2` (6, 6): as in
     `VectorSolution`, scaled so that twice a standard uncertainty is U.
@@ -178,7 +178,10 @@ def _redundancy_numbers(design: Array) -> Array:
 
 
 def _additional_std(noise_std: Array, expanded: Array, known_dof: float, dof: float) -> Array:
-    """Return the standard uncertainties (q,) that give, together with `noise_std` (q,), the U `expanded` (q,)."""
+    """Return the standard uncertainties (q,) that give, together with `noise_std` (q,), the U `expanded` (q,).
+
+    Degrees of freedom are `known_dof` for the noise, and `dof` for the result.
+    """
 
     def is_too_small(std: Array) -> Array:
         variances = np.array([noise_std**2, std**2])

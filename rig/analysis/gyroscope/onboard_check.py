@@ -93,7 +93,7 @@ def _list_unobserved(run: RunData, sensor: str) -> tuple[str, ...]:
 class _BoardObservation:
     """The mean reading (3,) and the speed of an observation of the board.
 
-    `averaged`: True if the host averaged the samples, False if the mean is the board's own, or NaN without a recording.
+    `averaged`: whether the host averaged the samples; if not, the mean is the board's own, or NaN if not recorded.
     """
 
     mean_rad_s: Array

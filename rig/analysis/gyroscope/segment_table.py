@@ -87,7 +87,7 @@ def append_transfers(
     """Return the segments with the transfers appended, numbered downwards from `REST` − 1.
 
     A transfer's noise is the larger of its own noise and that of other segments over the same duration. The effect of
-    vibration is added, estimated from the rests before and after. `windows` are those of which `segments` are parts.
+    vibration is added, estimated from the rests before and after. `windows` are the averages that `segments` divide.
     """
     if not transfers:
         return segments

@@ -1,4 +1,4 @@
-"""The errors of an accelerometer's readings in one run, from the part's data sheet, for solution and budget."""
+"""The errors of an accelerometer's readings in one run, from the part's data sheet, for the solution and its budget."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -58,7 +58,7 @@ class Datasheet:
 
     @property
     def even_s2_m(self) -> float:
-        """The half-width of the quadratic term φ if it alone is nonlinear.
+        """The half-width of the quadratic term φ if this term alone causes the nonlinearity.
 
         Up to the force V = `over_g`, φ v² deviates from its best line by φ V²/2.
         """

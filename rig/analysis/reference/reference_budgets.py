@@ -134,7 +134,7 @@ def _field(site: Site, field_t: float) -> NormUncertainty:
 
 
 def lag_pattern(movement: Movement, lag_s: float) -> Array:
-    """Return the pattern (1, 3 K) of the sensor's filter, which reduces a sweep's wave by (speed × `lag_s`)²/2."""
+    """Return the effect (1, 3 K) of the sensor's filter on the readings: (speed × `lag_s`)²/2 of a sweep's wave."""
     dwells, sweeps = movement.dwells, movement.sweeps
     smaller = sweeps.harmonics_m_s2 * np.square(sweeps.speeds_rad_s * lag_s)[:, None, None] / 2
     smaller[:, 0] = 0.0  # the mean is not reduced

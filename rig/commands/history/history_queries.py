@@ -183,7 +183,7 @@ def verify(options: Namespace) -> int:
 
 
 def compare(options: Namespace) -> int:
-    """Print how two calibrations of one sensor differ, and draw it with `--plot`; return 0.
+    """Print how two calibrations of one sensor differ, and with `--plot` draw the differences; return 0.
 
     Raise Refused `not_in_history`, `not_comparable`, and what `plot` raises.
     """

@@ -259,7 +259,10 @@ def refuse_other_sensors(config: RigConfig) -> None:
 
 
 def _read_ended(folder: Path, configured: Configured) -> PartEnded | None:
-    """Enter in the history a run that ended before the station was killed; return its end, or None to repeat sweeps."""
+    """Return the end of a run that ended before the station was killed, and enter the run in the history.
+
+    If sweeps failed, return None and enter nothing, because these sweeps are to be repeated.
+    """
     result = read_result(folder)
     failed = [check for check in result.checks if not check.passed]
     if any(check.means.sweep is not None for check in failed):

@@ -119,7 +119,7 @@ def _carry_out_batch(options: Namespace, configured: "Configured", operator: "Op
 
 @contextmanager
 def _send_heartbeats(config: "RigConfig", present: "Present") -> Iterator[None]:
-    """Send the station's heartbeat to the runs' history, if any, during the block."""
+    """Send the station's heartbeat to the history of its runs during the block; without a history do nothing."""
     from rig.floor.heartbeat import heartbeat
     from rig.history.storage.address import choose_history_address
 

@@ -1,4 +1,4 @@
-"""The sensors' load on a serial link, in bytes per second, by the protocol's own table. Pure."""
+"""The sensors' load on a serial link, in bytes per second, computed from the protocol's own table. Pure."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

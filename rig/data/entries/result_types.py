@@ -59,7 +59,7 @@ class ConditionsEntry(Entry):
 
     @property
     def temperature_stated(self) -> bool:
-        """Whether its temperature was stated instead of read."""
+        """Whether the temperature was stated instead of read."""
         return self.temperature_c is not None and self.temperature_range_c is None
 
 

@@ -48,7 +48,7 @@ class Interrupts:
         self.allow()
 
     def allow(self) -> None:
-        """Permit the next signal to raise, however soon after the last one."""
+        """Permit the next signal to raise an exception, however soon after the last signal."""
         self._raised_s = float("-inf")
         self._first_s: float | None = None  # arrival of the signal that waits for a lock
 

@@ -65,7 +65,7 @@ def _allow_jumps(factors: Sequence[Factor], rests: Sequence[int]) -> Iterator[li
 def _distances_from_neighbours(times_s: Array, biases: Array, left_out: Sequence[int]) -> Array:
     """Return the distance (n,) of each bias (n, 3) from the value interpolated between its two neighbours in time.
 
-    The distance is 0 at both ends, in a rest that is left out, and next to one.
+    The distance is 0 at both ends, in a rest that is left out, and in the neighbours of such a rest.
     """
     distances = np.zeros(len(times_s))
     for row in range(1, len(times_s) - 1):

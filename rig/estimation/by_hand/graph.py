@@ -156,7 +156,7 @@ class Graph:
 
     @cached_property
     def rotations_rad(self) -> Array:
-        """The rotation vectors (N − 1, 3) of `between`."""
+        """The rotation vectors (N − 1, 3) of the rotations `between`."""
         return rotation_vectors(self.between)
 
     @cached_property
@@ -326,7 +326,7 @@ def _flat(graph: Graph, row: int, face: int) -> Factor:
 
 
 def _acceleration(graph: Graph, row: int) -> Factor:
-    """Return the factor of a rest's mean acceleration, in two directions across the vertical and along it."""
+    """Return the factor of the mean acceleration in rest `row`: two components across the vertical, one along it."""
     session, state, conditions = graph.session, graph.state, graph.conditions
     rest = session.rests[row]
     assert rest.acceleration_m_s2 is not None and rest.acceleration_noise_m_s2 is not None

@@ -69,7 +69,7 @@ def find_masked_fault(fit: GraphFit) -> Fault | None:
 
 
 def _hypotheses(fit: GraphFit, since: int | None) -> Iterator[tuple[str, int]]:
-    """Yield the possible faults of a session, or of its part that begins at the rest `since`."""
+    """Yield possible faults of a session, or of its part from the rest `since` on: name, and index of rest or move."""
     count = len(fit.session.rests)
     first = 0 if since is None else since
     for index in range(max(first - 1, 0), count - 1):
@@ -157,7 +157,7 @@ def _much_larger(stds: HandStds, than: HandStds) -> bool:
 
 
 def _minimum_chi_square(rows: Sequence[Factor]) -> float:
-    """Return the least χ² of the rows over all parameters."""
+    """Return the χ² of the rows, minimised over all parameters."""
     design, residual = whiten_rows(rows)
     return float(np.sum(np.square(residual + design @ solve_step(rows)[0])))
 

@@ -268,7 +268,7 @@ def check_earth_rate(
 ) -> None:
     """Check that the estimate `free_rad_s` (d,) of the Earth's rate is significant and has the expected size.
 
-    Raise Fault `earth_rate_not_observable`.
+    Raise Fault `earth_rate_not_observable`, whose message calls the estimated part of the Earth's rate `component`.
     """
     free = float(np.linalg.norm(free_rad_s))
     worst = float(np.sqrt(np.linalg.eigvalsh(covariance_rad2_s2)[-1]))

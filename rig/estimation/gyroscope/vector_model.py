@@ -186,7 +186,7 @@ def check_observations(
 def fit_coefficients(
     design: Array, means: Array, rates: Array, variances: Array, *, speed_std: Array, shared: Array | None
 ) -> tuple[Array, Array, Array | None]:
-    """Return the coefficients and the map of `regress`, and the effect (N, 3) of the speeds' errors on the readings.
+    """Return coefficients, their map from the means (see `regress`), and the effect (N, 3) of the speeds' errors.
 
     The weights include this effect. The effect is None if all speeds are exact.
     """

@@ -1,1 +1,1 @@
-"""Accelerometers and magnetometers in a constant reference, at rest in attitudes and in sweeps."""
+"""Accelerometers and magnetometers in a constant reference (gravity, a field), at rest in attitudes and in sweeps."""

@@ -186,7 +186,7 @@ def project_reference(delay_s: float, movement: Movement) -> Array:
 
 
 def _differentiate_lag(waves: Array, sweeps: Sweeps) -> Array:
-    """Return the change of harmonics `waves` (M, 3, …) per second of the filter's lag, by uneven rotation alone."""
+    """Return the change of harmonics `waves` (M, 3, …) per second of the filter's lag, due to uneven rotation alone."""
     by_wave = (len(waves), 3, *(1,) * (waves.ndim - 2))
     cosine, sine = (sweeps.turning_rad2_s2[:, row] / sweeps.speeds_rad_s[:, None] for row in (4, 5))
     changed: Array = sine.reshape(by_wave) * waves[:, 1:2] - cosine.reshape(by_wave) * waves[:, 2:]
@@ -266,7 +266,7 @@ def effects(theta: Array, movement: Movement) -> Array:
 
 
 def split_effects(theta: Array, movement: Movement) -> tuple[Array, Array | None]:
-    """Return the columns of `effects` in two parts: independent errors, and the wrists' constant ones if known."""
+    """Return the columns of `effects` in two parts: independent errors, and constant errors of the wrists or None."""
     independent = arm_effects(theta, movement)
     if movement.arm_turns is None:
         return independent, None
@@ -328,7 +328,7 @@ def _read(changes: Array, s: Array, theta: Array, movement: Movement) -> Array:
 
 
 def _product(one: Array, other: Array, movement: Movement) -> Array:
-    """Return the elementwise product (K, 3, …); in sweeps that of two Fourier series, without its second harmonic."""
+    """Return the elementwise product (K, 3, …); in sweeps the product of two series, without its second harmonic."""
     count = len(movement.dwells.readings_m_s2)
     mean, cos, sin = np.moveaxis(_harmonics_of_sweeps(one, movement), 1, 0)
     others = np.moveaxis(_harmonics_of_sweeps(other, movement), 1, 0)

@@ -36,7 +36,7 @@ def linear_start(movement: Movement, norm: float, up: Array) -> Array:
 
 
 def _linear(movement: Movement, readings: Array, norm: float, up: Array) -> Array:
-    """Return the parameters by linear equations, for readings (K, 3) minus the effect of the flange's acceleration."""
+    """Return the parameters that solve linear equations in readings (K, 3) without the flange's acceleration."""
     x = np.zeros((*readings.shape, LEVER.stop))
     for axis in range(3):
         x[:, axis, 3 * axis : 3 * axis + 3] = readings

@@ -94,7 +94,7 @@ class FieldDrift:
 
 
 def field_drift(means_t: ArrayLike, variances_t2: ArrayLike, repeatability_rad: float) -> FieldDrift:
-    """Return the most significant change of readings (N, 3), N ≥ 2, in one attitude since the first of them.
+    """Return the most significant change from the first to a later one of mean readings (N, 3) in one attitude, N ≥ 2.
 
     `variances_t2` (N, 3) are those of the means. The attitude repeats with a standard deviation of `repeatability_rad`
     about each axis.

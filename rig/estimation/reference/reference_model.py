@@ -37,7 +37,7 @@ class KnownVector:
 
 @dataclass(frozen=True, slots=True)
 class KnownNorm:
-    """The given norm of the reference of a table at rest, which has a positive dot product with `side` (3,)."""
+    """The given norm of a resting table's reference, a vector that has a positive dot product with `side` (3,)."""
 
     norm: float
     side: ArrayLike

@@ -119,7 +119,7 @@ def too_short(what: str, enough_s: float = MIN_DURATION_S) -> Fault:
 def equivalent_dof(points: int, factor: int, noise: Noise) -> float:
     """Return the equivalent dof (at least 1) of the Allan variance of means of `factor` readings.
 
-    `points` is the number of phases, one more than that of all readings.
+    `points` is the number of phases (sums of readings), which is one more than the number of readings.
     """
     # Approximations for white, flicker and random-walk noise of frequency: NIST SP 1065, table 5.
     n, m = float(points), float(factor)

@@ -1,10 +1,10 @@
 """Weights of a mean, the same for all quantities averaged over the same samples.
 
-A reading is F ω + c plus nuisance effects. Weights w orthogonal to the nuisance columns N give wᵀ m = F wᵀ ω + c: the
-mean of the readings corresponds to the mean of ω with the same weights, even if the samples cover a vibration
-incompletely or end at any time. In a least-squares fit of the groups' means together with coefficients of the
-nuisance columns, the rows of the pseudoinverse that belong to the means are these weights (the Frisch–Waugh–Lovell
-theorem).
+A reading m at the rate ω is F ω + c plus nuisance effects. Weights w orthogonal to the columns of these effects give
+wᵀ m = F wᵀ ω + c: the mean of the readings corresponds to the mean of ω with the same weights, even if the samples
+cover a vibration incompletely or end at any time. In a least-squares fit of the groups' means together with
+coefficients of the nuisance columns, the rows of the pseudoinverse that belong to the means are these weights (the
+Frisch–Waugh–Lovell theorem).
 """
 
 import numpy as np

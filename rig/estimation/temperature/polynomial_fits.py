@@ -1,6 +1,6 @@
 """Fits of the polynomials of scale and bias over temperature to the readings of repeated poses, for given orders.
 
-The model is that of `rig.estimation.temperature.over_temperature`. Its weights are those of noise and bias drift.
+The model is that of `rig.estimation.temperature.over_temperature`. The weights follow from noise and bias drift.
 """
 
 from dataclasses import dataclass

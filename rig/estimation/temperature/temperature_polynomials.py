@@ -66,7 +66,7 @@ class OverTemperature:
 
     @property
     def covariance(self) -> Array:
-        """The covariance (24, 24) of all contributors together."""
+        """The covariance (24, 24) of the coefficients, due to all contributors together."""
         combined: Array = np.sum([line.covariance for line in self.lines], axis=0)
         return combined
 

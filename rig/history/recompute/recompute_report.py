@@ -79,7 +79,7 @@ def counts(outcome: RecomputeOutcome) -> Iterator[str]:
 
 
 def notable_table(outcome: RecomputeOutcome, most: int) -> FittingTable:
-    """Return the first notable results, in the order of time."""
+    """Return a table of the first notable results, at most `most` rows, in the order of time."""
     lines = list(_lines(outcome))[:most]
     columns = (
         TableColumn("number", [line["number"] for line in lines], number=True),

@@ -1,4 +1,4 @@
-"""Effects of rigs on results. Sensors that were calibrated on several rigs separate them from the sensors' effects."""
+"""Effects of rigs on results, separated from the effects of sensors by sensors that several rigs have calibrated."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -31,7 +31,7 @@ class HistoryAddress:
 def choose_history_address(
     section: "HistorySection", environment: Mapping[str, str] = os.environ
 ) -> HistoryAddress | None:
-    """Return the history of a run, by the environment (`RIG_HISTORY`) or else the configuration; None if switched off.
+    """Return a run's history, from the environment (`RIG_HISTORY`) or else the configuration; None if switched off.
 
     `section` must be from a configuration that the user has named or run before, never from another user's folder.
     Raise Refused `history_address`.

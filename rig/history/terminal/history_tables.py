@@ -49,7 +49,7 @@ def trends_table(subject: Subject, trends: Sequence[Trend]) -> FittingTable:
 
 
 def trend_lines(trends: Mapping[str, Trend]) -> Iterator[str]:
-    """Yield lines that explain the table and its missing values."""
+    """Yield lines that explain the table of `trends` and the values that are missing in it."""
     if not trends:
         return
     fewest = min(trend.count for trend in trends.values())

@@ -39,7 +39,7 @@ class RawDwell:
 
     @property
     def middle_s(self) -> float:
-        """Middle of the window by the controller's time, s."""
+        """The middle of the window on the controller's clock, s."""
         return (self.window.start_s + self.window.end_s) / 2
 
 

@@ -137,7 +137,7 @@ class _Division:
         return self.subtract_means(values, mean_weights(self.groups, self.groups[:, :0]))
 
     def subtract_means(self, values: Array, weights: Array) -> Array:
-        """Return values (m, k) minus the means of their segments with weights (p, m)."""
+        """Return values (m, k) minus the means of their segments; `weights` (p, m) compute the means of p segments."""
         residuals: Array = values - self.groups @ (weights @ values)
         return residuals
 

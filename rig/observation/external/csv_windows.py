@@ -145,7 +145,7 @@ CLOCK_REMEDY = "Check that both files use one clock in seconds, and that no samp
 
 
 def check_complete(count: int, expected: float, window: Window, where: str, least: int = MIN_SAMPLES) -> None:
-    """Raise Fault `lost_samples` if a window holds fewer samples than `expected`."""
+    """Raise Fault `lost_samples` if a window holds fewer than `least` samples, or many fewer than `expected`."""
     if is_complete(count, expected, least):
         return
     lasts_s = window.end_s - window.start_s

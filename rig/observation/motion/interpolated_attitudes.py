@@ -43,10 +43,10 @@ def find_interpolated(time_s: Array, quaternions: Array) -> NDArray[np.bool_]:
 
 
 def _measure_chords(time_s: Array, quaternions: Array) -> tuple[Array, Array]:
-    """Return the distances (2, n − 2) of rows from the chord between their neighbours, and those of unit quaternions.
+    """Return distances (2, n − 2) of rows from the chord between their neighbours, and distances of unit quaternions.
 
-    The first distances are from the point of the chord that an interpolation from row to row gives, the second from the
-    point that an interpolation over time gives. At the fraction w of a chord of length d, a unit quaternion has the
+    Both arrays begin with the distances from the point of the chord that an interpolation from row to row gives; their
+    second row is for an interpolation over time. At the fraction w of a chord of length d, a unit quaternion has the
     distance w (1 − w) d² / 2.
     """
     before, rows, after = quaternions[:-2], quaternions[1:-1], quaternions[2:]

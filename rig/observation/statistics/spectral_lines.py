@@ -155,8 +155,9 @@ def fit_residuals(columns: Array, values: Array) -> Array:
 def find_angle_change_rad2(residuals: Array, columns: Array, lines_hz: Array) -> Array:
     """Return the mean square (3,), rad², of the body's rotation by vibration from one random moment to another.
 
-    The vibration is the spectral lines whose columns (n, w k) are fitted to residuals (n, 3). A line of mean square P
-    and frequency f has the angle amplitude √(2 P) / (2π f), so the mean square of its change is P / (2 π² f²).
+    The vibration is k spectral lines with w columns each; the columns (n, w k) are fitted to residuals (n, 3). A line
+    of mean square P and frequency f has the angle amplitude √(2 P) / (2π f), so its change has the mean square
+    P / (2 π² f²).
     """
     width = columns.shape[1] // max(len(lines_hz), 1)
     sizes = fit_columns(columns, residuals).reshape(len(lines_hz), width, residuals.shape[1])

@@ -57,7 +57,7 @@ def noise_at_zero(readings: Array, low: float = LOW_FRACTION) -> Array:
 
 
 def apply_window(readings: Array) -> Array:
-    """Return readings (n, 3) minus their mean under Blackman and Harris' window, whose squares add up to 1."""
+    """Return readings (n, 3) minus their mean, times Blackman and Harris' window, whose squares add up to 1."""
     windowed: Array = _window(len(readings))[:, None] * (readings - readings.mean(axis=0))
     return windowed
 

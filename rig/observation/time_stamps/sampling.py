@@ -199,7 +199,7 @@ def find_typical_interval_s(time_s: Array) -> float:
 
 
 def _count_missing(time_s: Array, width: int, quantile: float) -> _PeriodCandidate:
-    """Return the period, and the readings missing in each step, if readings arrive in packets of `width`."""
+    """Return the interval, and the number of readings missing in each step, if they arrive in packets of `width`."""
     steps_s, numbers = np.diff(time_s), np.arange(len(time_s))
     interval_s, last_s = _interval_quantile(time_s, max(8, 4 * width), quantile), 0.0
     missing, fit = np.zeros(len(steps_s), dtype=np.intp), 0.0
@@ -307,7 +307,7 @@ def _interval_quantile(time_s: Array, apart: int, quantile: float = MEDIAN) -> f
 
 
 def find_resolution_s(time_s: Array) -> float:
-    """Return the resolution of the stamps: a power of ten of a second, or of two (float32); 0 if none is found."""
+    """Return the resolution of the stamps, s: a power of ten, or of two as in float32; 0 if no power fits."""
     units = sorted((*(10.0**-decimals for decimals in range(MAX_DECIMALS)), *(2.0**-bits for bits in range(MAX_BITS))))
     since_s = time_s - time_s[0]
     for unit_s in reversed(units):

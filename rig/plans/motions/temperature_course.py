@@ -40,7 +40,7 @@ class TemperatureCourse:
             self._turn_round(self.sets[-1])
 
     def add_set(self, step: SetMeasured) -> None:
-        """Add a measured set, and reverse the direction if the set was at the end of the range."""
+        """Add a measured set of sweeps, and reverse the direction if this set was at the end of the range."""
         self.sets.append(step)
         self._turn_round(step)
 
@@ -51,7 +51,7 @@ class TemperatureCourse:
             self.warming = True
 
     def is_due(self, now_c: Mapping[str, float]) -> bool:
-        """Return whether the sensors' temperatures have changed enough for the next set, or have reached the end."""
+        """Return whether the sensors' temperatures are far enough for the next set of sweeps, or at the range's end."""
         if not self.sets:
             return True
         if min(now_c.values()) >= self.to_c if self.warming else max(now_c.values()) <= self.from_c:
@@ -69,7 +69,7 @@ class TemperatureCourse:
         return min(max(last) + step_k, self.to_c) if self.warming else max(min(last) - step_k, self.from_c)
 
     def missing(self) -> str | None:
-        """Return the part of the range without a set, in words; None if the range is covered."""
+        """Return the part of the range without a set of sweeps, in words; None if the range is covered."""
         directions = ((True, "while warming"), (False, "while cooling")) if self.both_directions else ((None, ""),)
         return next(self._missing(directions), None)
 
@@ -85,7 +85,7 @@ class TemperatureCourse:
                     yield f"{name} was never between {gap[0]:.1f} and {gap[1]:.1f} °C {words}".strip()
 
     def _sets_in(self, direction: bool | None) -> list[SetMeasured]:
-        """Return the sets in a `direction`, or all if None; a set at a reversal belongs to both directions."""
+        """Return the sets of sweeps in a `direction`, or all if None; a set at a reversal is in both directions."""
         pairs = zip_longest(self.sets, self.sets[1:])
         return [
             step

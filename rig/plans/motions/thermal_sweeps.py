@@ -51,6 +51,6 @@ def _sets(arm: ArmSection, procedure: ThermalSection) -> Iterator[list[Step]]:
 
 
 def _wait_s(procedure: ThermalSection, steps: list[Step]) -> float:
-    """Return the shortest wait before the next set, s: that at the largest permitted rate of the temperature."""
+    """Return the wait before the next set of sweeps, s, if the temperature changes at its largest permitted rate."""
     gap_s = 60 * NEXT_SET_FRACTION * procedure.max_step_k / procedure.max_rate_k_per_min
     return max(MIN_WAIT_S, gap_s - sum(step.duration_s for step in steps))

@@ -356,7 +356,7 @@ def _find_rest_calibrations(result: ResultDocument, stated: StatedFacts) -> Iter
 
 
 def _size_stated(budget: BudgetEntry) -> bool:
-    """Return whether the standard's uncertainty is stated (normally distributed) rather than an assumed half-width."""
+    """Return whether the uncertainty of the reference standard is stated (normal), not an assumed half-width."""
     return any(line.kind == "B" and line.distribution == "normal" for line in budget.contributors)
 
 

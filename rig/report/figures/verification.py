@@ -64,7 +64,10 @@ def write_figures(outcome: Outcome, document: ResultDocument, folder: Path) -> t
 
 
 def draw_verifications(verifications: Iterable[Verification], folder: Path) -> tuple[RunEvent, ...]:
-    """Draw `verification_<sensor>_before`, if any, and `…_after` for each; return the event that names them."""
+    """Draw each comparison with the reference, before (if recorded) and after calibration; return the pictures' event.
+
+    The files are called `verification_<sensor>_before` and `verification_<sensor>_after`.
+    """
     pictures = [
         Picture(
             f"verification_{verification.sensor}_{when}",

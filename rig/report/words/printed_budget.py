@@ -56,7 +56,10 @@ class PrintedBudget:
 
 
 def lay_out_budget(budget: BudgetEntry, scale: Sequence[float], bias: DisplayUnit) -> PrintedBudget:
-    """Return the printed budget, largest contributions first, negligible ones in one line, biases in unit `bias`."""
+    """Return the printed budget: largest contributions first, negligible ones in one line, biases in unit `bias`.
+
+    `scale` are the sensor's scale factors, to which the printed scale factor's U is relative.
+    """
     indices = find_printed_indices(budget, scale)
     sizes = [
         _Size.choose(budget.std[indices[0]], 1.0, ""),

@@ -57,7 +57,7 @@ def warmth(when: ConditionsEntry, use: str = "") -> dict[str, float | None]:
 
 
 def label_source(use: str) -> str:
-    """Return a label that `warmth` has made (`use`), with the temperature's source."""
+    """Return the label `use`, which `warmth` has made, completed by the source of the temperature."""
     return use if use.endswith(STATED_SUFFIX) else f"{use}, by its own thermometer"
 
 

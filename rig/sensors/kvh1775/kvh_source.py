@@ -81,7 +81,7 @@ class Kvh1775Source:
         self._driver.own_port.check(clock_s)
 
     def catch_up(self) -> None:
-        """Wait for what has arrived (see `OwnPort.catch_up`)."""
+        """Wait until all data that have arrived by now are taken (see `OwnPort.catch_up`)."""
         self._driver.own_port.catch_up()
 
     def close(self) -> None:

@@ -86,7 +86,7 @@ class ServoLink:
     def call(self, job: Job, *, also_stopped: bool = False) -> Any:
         """Run a job between two polls; return its value or raise its error.
 
-        Raise PortGone if the thread does not run it, and JobCancelled after a stop unless `also_stopped`.
+        Raise PortGone if the thread does not run the job, and JobCancelled after a stop unless `also_stopped`.
         """
         done = threading.Event()
         outcome: dict[str, Any] = {}

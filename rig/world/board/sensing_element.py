@@ -16,7 +16,7 @@ class ElementFault(StrEnum):
 
 
 class SensingElement:
-    """The motion that a part senses, over time: the true motion `motion_at`, or one falsified by a fault."""
+    """The motion that a part senses, over time: the true motion `motion_at`, or a motion falsified by a fault."""
 
     def __init__(self, motion_at: MotionAt) -> None:
         self._motion_at = motion_at

@@ -35,7 +35,7 @@ class InputRecipe:
 
 
 class OutputRecipe:
-    """An output recipe: the getters in order and one precompiled layout."""
+    """An output recipe: the getters of its variables, in order, and the precompiled layout of a package."""
 
     def __init__(self, names: list[str], frequency_hz: float, recipe_id: int | None) -> None:
         kinds = [OUTPUTS[name][0] for name in names]
