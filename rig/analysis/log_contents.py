@@ -112,7 +112,7 @@ def _find_reference(looks: Sequence[LookedFile]) -> LookedFile | None:
 
 
 def _count_from(looked: LookedFile, origin_s: int) -> LookedFile:
-    """Return a reference's file with its attitudes' times counted from the origin of a log's times."""
+    """Return a reference's file with the attitudes' times counted from `origin_s`, the origin of a log's times."""
     if looked.attitudes is None or not origin_s:
         return looked
     times = {name: looked.attitudes[name] - origin_s for name in ("start_s", "end_s")}

@@ -127,7 +127,7 @@ class Batch:
         return next((part for part in reversed(self.parts) if part.serial == serial and _has_verdict(part)), None)
 
     def same_chip(self, chip: Chip, serial: str) -> BatchPart | None:
-        """Return the part of another serial number with this chip and a verdict, or None."""
+        """Return the part with this chip and a verdict whose serial number is not `serial`, or None."""
         for part in reversed(self.parts):
             earlier = part.ended.chip if part.ended is not None and _has_verdict(part) else None
             if part.serial != serial and earlier is not None and earlier.is_that(chip):

@@ -37,7 +37,7 @@ class Operator:
         return self.numbers is not None
 
     def next_part(self, done: Sequence[BatchPart], why: str = "") -> str | None:
-        """Return the next serial number, from the list or typed; `why`: the reason if the last one was refused."""
+        """Return the next serial number, from the list or typed; `why` is the reason if the last number was refused."""
         if self.numbers is not None:
             return next_serial_number(self.numbers, [part.serial for part in done])
         text = f"part {len(done) + 1}, serial number (Enter alone ends):"

@@ -151,7 +151,7 @@ def check_reading_ratio(ratio: float, where: str) -> None:
 
 
 def is_plausible(ratio: ArrayLike) -> NDArray[np.bool_]:
-    """Return a mask, true for those ratios of reading to true value, or the reverse, that a sensor can have."""
+    """Return a mask of the ratios that a sensor can have, of reading to true value or of true value to reading."""
     ratios = np.asarray(ratio, dtype=np.float64)
     return (ratios < MAX_SCALE_RATIO) & (ratios > 1 / MAX_SCALE_RATIO)
 

@@ -51,7 +51,7 @@ class Heartbeat:
         self._thread.join(LAST_STATE_S)
 
     def _beat(self) -> None:
-        """Write the state until it is the last one; open the history again after an error."""
+        """Write the state again and again until the station ends; open the history again after an error."""
         while True:
             try:
                 with open_history(self._address) as history:

@@ -57,7 +57,7 @@ def examine_history(history: History) -> Iterator[EntryState]:
 
 
 def _contradictions(run: KeptRun, pasts: Sequence[Past]) -> Iterator[str]:
-    """Yield the first contradictions between the rows of a run and its result, then the number of further ones."""
+    """Yield the first contradictions between the rows and the result of a run, then the number of the other ones."""
     try:
         if content_sha256(run.result) != run.content_sha256:
             yield "the result in the history is not as it was entered"

@@ -173,7 +173,7 @@ class Readings:
         return np.concatenate([times_s(run, self.name, self._bases(run)) for run in self.recordings])
 
     def _bases(self, run: RunData) -> Mapping[str, Any]:
-        """Return, by name, the time base of this sensor or of a gyroscope on the same clock; empty without any."""
+        """Return the time base of this sensor or else of a gyroscope on the same clock, by its name; empty if none."""
         gyroscopes = run.measuring(RATE)
         others = (name for name in gyroscopes if one_clock(run, self.name, name))
         source = self.name if self.name in gyroscopes else next(others, None)

@@ -24,7 +24,7 @@ REMEDY = "Check the sensor's supply and its bus wiring, then repeat the run"
 
 
 def check_rests(rests: Sequence[Average], slowest_rad_s: float) -> None:
-    """Raise Fault `stuck_sensor` if an axis' means in two rests differ by as much as a rotation would change them.
+    """Raise Fault `stuck_sensor` if an axis' means in two rests differ by as much as a sweep would change them.
 
     Raise `stuck_axis` instead if this axis has no noise.
     """

@@ -74,7 +74,7 @@ class EndingEarly:
 
     @contextmanager
     def look_in_background(self) -> Iterator["Future[ReachedUncertainty | None]"]:
-        """Compute the uncertainty so far in a thread; yield its future."""
+        """Compute the uncertainty reached so far in a thread; yield the future of this uncertainty."""
         pool = ThreadPoolExecutor(max_workers=1)
         try:
             yield pool.submit(self._look)

@@ -435,7 +435,7 @@ class Rig:
 
     @contextmanager
     def _step(self, step: Step, then: Callable[[], None] = lambda: None) -> Iterator[None]:
-        """Report the start and end of a step; call `then` within the step, but after its recorded time."""
+        """Report the start and end of a step; call `then` before the end is reported, outside the reported duration."""
         self._number += 1
         position = self._number, len(self.plan.steps), step
         turner = self.devices.turner

@@ -1,4 +1,4 @@
-"""The error of a sensor on a port of its own."""
+"""The exception for errors of a sensor on a port of its own."""
 
 from rig.errors import ProblemError
 

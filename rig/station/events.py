@@ -206,7 +206,7 @@ class HandSeen:
 
 @dataclass(frozen=True, slots=True)
 class ObservationMade:
-    """The host has averaged a revolution of `sensor`, or after the verdict all revolutions of its calibration."""
+    """The host has averaged a revolution of `sensor`; all are reported again after the verdict on its calibration."""
 
     sensor: str
     observation: Observation

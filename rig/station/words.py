@@ -141,7 +141,7 @@ def _entry_words(history: str, numbers: Sequence[int], *, usual: bool) -> str:
 
 
 def reason(event: RunEvent) -> str | None:
-    """Return why a run ended early, for the log, else None; on a terminal the command prints it last."""
+    """Return, for the log, the reason of an event that ends a run early, else None; a terminal shows it at the end."""
     match event:
         case Failed(error) if error.name == "script_failed" and error.__cause__ is not None:
             return f"{error}\n{''.join(format_exception(error.__cause__)).rstrip()}"

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class _Example:
-    """An example of Table I of the paper SIX: true parameters, and those after the last and the first pass."""
+    """An example of Table I of the paper SIX: true parameters, and estimates after the last and the first pass."""
 
     scale: tuple[float, float, float]
     bias_rad_s: tuple[float, float, float]

@@ -13,7 +13,7 @@ from rig.observation.by_hand.rests_and_moves import collect_inputs, session_of
 
 
 def calibrate_by_hand(runs: Sequence[RunData]) -> Outcome:
-    """Return the outcome, as `rig.analysis.analyses.calibrate_by_hand` describes it."""
+    """Return the outcome of a session by hand (see `rig.analysis.analyses.calibrate_by_hand`)."""
     settings = runs[0].settings
     refuse_different_sensors(runs)
     results = {}

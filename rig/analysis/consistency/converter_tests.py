@@ -208,7 +208,7 @@ def _skewness(windows: Sequence[RawReadings], axes: NDArray[np.bool_], critical_
 
 
 def _longest_run(counts: NDArray[np.int64]) -> int:
-    """Return the longest run of equal readings of one axis."""
+    """Return the number of readings in the longest run of equal readings of any axis."""
     longest = 0
     for axis in counts.T:
         changes = np.flatnonzero(np.diff(axis))

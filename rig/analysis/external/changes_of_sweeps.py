@@ -41,7 +41,7 @@ def estimate_changes(data: ExternalData, matrix: Array) -> Array:
 
 
 def widen_by_changes(solution: TurnedSolution, data: ExternalData) -> TurnedSolution:
-    """Return a solution by turns with the gyroscope's changes over the rows in its covariances and its budget."""
+    """Return a solution by turns whose covariances and budget include the gyroscope's changes over the rows."""
     changes = estimate_changes(data, solution.matrix)
     to_parameters = parameter_jacobian(solution.matrix, solution.scale)
     more = to_parameters @ changes @ to_parameters.T

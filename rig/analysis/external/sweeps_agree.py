@@ -135,7 +135,7 @@ def noise_dof(solution: VectorSolution, data: ExternalData) -> float:
 
 
 def add_errors(solution: VectorSolution, data: ExternalData) -> VectorSolution:
-    """Return the solution with the errors of the stated motion in its covariances."""
+    """Return the solution with covariances that include the errors of the stated motion."""
     more = sweep_errors(solution, data)
     if more is None:
         return solution

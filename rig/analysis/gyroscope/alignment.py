@@ -56,7 +56,7 @@ class RelativeRotation:
 
 
 def collect_mean_rates(observations: Sequence[Observation], calibration: LinearCalibration | None = None) -> MeanRates:
-    """Return a sensor's mean rate in each revolution, corrected by its calibration if it has one."""
+    """Return a sensor's mean rate in each revolution, corrected by the `calibration` if there is one."""
     means = np.array([observation.average.mean_rad_s for observation in observations])
     variances = np.array([observation.average.variance_rad2_s2 for observation in observations])
     raw = MeanRates(means, variances[:, :, None] * np.eye(3))

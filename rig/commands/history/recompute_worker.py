@@ -33,7 +33,7 @@ class Task:
 
 
 def solve_task(task: Task) -> Answer:
-    """Solve recordings that equal the entered ones byte by byte, or return why they are not solved. Write nothing."""
+    """Return the solution of recordings that equal the entered ones byte by byte, or why there is no solution."""
     if task.rig_version != VERSION:
         return Unsolved("failed", f"the worker has version {VERSION} of the rig, not {task.rig_version}")
     folder = _find_folder(task)

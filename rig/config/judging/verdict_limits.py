@@ -136,7 +136,7 @@ def key_of(quantity: str | None, what: str | None) -> str | None:
 
 
 def limit_of(limits: Limits | None, quantity: str, what: str) -> tuple[Limit, float | None]:
-    """Return the row of a quantity's check `what`, and its limit, None if not set. Raise KeyError without a row."""
+    """Return the `Limit` of a quantity's check `what`, and its value, None if not set. Raise KeyError if unknown."""
     key = _KEYS[quantity, what]
     limit: float | None = getattr(limits, key, None)
     return LIMITS[key], limit

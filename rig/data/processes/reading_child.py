@@ -64,7 +64,7 @@ def _encode(part: Part) -> bytes:
 
 
 def _end_with_parent() -> None:
-    """Make the system kill this process when its parent ends, and ignore Ctrl-C."""
+    """Make the system kill this process when its parent ends, and make this process ignore Ctrl-C."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if sys.platform == "linux":
         import ctypes

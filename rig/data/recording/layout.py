@@ -54,7 +54,7 @@ class Contents:
 
     @cached_property
     def turner(self) -> RecordedTurner | None:
-        """The turner that its text describes; None for external readings. Raise ValueError."""
+        """The turner that the file's text describes; None for external readings. Raise ValueError."""
         return turner_of(self.texts["turner"]) if self.schema == SCHEMA else None
 
 

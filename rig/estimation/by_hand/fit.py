@@ -100,7 +100,7 @@ _REMEDY = "See that each move is between two rests on the table, that no reading
 
 
 def _start(integrals: MoveIntegrals, faces: RestFaces, initial: GyroscopeModel) -> GraphState:
-    """Return initial values of the unknowns; attitudes follow from the moves, each tilted so that its face is up."""
+    """Return initial values of the unknowns; attitudes follow from the moves, tilted so that the rest's face is up."""
     attitudes = [_align_vertical(np.eye(3), faces.up[0])]
     for row, rotation in enumerate(integrals.rotations):
         attitudes.append(_align_vertical(attitudes[-1] @ rotation, faces.up[row + 1]))

@@ -55,7 +55,7 @@ def find_contradiction(fit: GraphFit, since: int | None = None) -> Fault | None:
 
 
 def find_masked_fault(fit: GraphFit) -> Fault | None:
-    """Return the fault of the one rest or turn that inflates the stds of the hand's moves; None if none does."""
+    """Return the fault of the single rest or turn that inflates the stds of the hand's moves, if there is one."""
     if not _much_larger(fit.stds, STATED):
         return None
     hypotheses = sorted(_test_hypotheses(fit, None), key=lambda hypothesis: hypothesis.chi_square_drop)

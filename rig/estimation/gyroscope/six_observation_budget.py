@@ -87,7 +87,7 @@ def response_of(solution: Solution, inputs: VectorInputs) -> Array:
 
 
 def _propagate_speeds(inputs: VectorInputs, matrix: Array) -> Array:
-    """Return the effect (N, 3) of one standard deviation of each sweep's speed on its reading."""
+    """Return the effect (N, 3) of one standard deviation of each sweep's speed on the sweep's mean reading."""
     size = np.linalg.norm(inputs.turns_rad_s, axis=1, keepdims=True)
     directions = np.divide(inputs.turns_rad_s, size, out=np.zeros(inputs.turns_rad_s.shape), where=size > 0)
     added: Array = inputs.speed_std_rad_s[:, None] * directions @ matrix.T

@@ -242,7 +242,7 @@ def design_matrix(rates: Array, gravity: Array | None) -> Array:
 
 
 def _unit(design: Array) -> Array:
-    """Return the divisor (p,) of each column: the RMS of its block, which is rates, ones or gravity."""
+    """Return the divisor (p,) of each column, the RMS of the column's block: the rates, the ones, or gravity."""
     squares = np.einsum("np,np->p", design, design).tolist()
     of_rates, of_gravity = ((sum(squares[block]) / len(design)) ** 0.5 or 1.0 for block in (slice(0, 3), slice(4, 7)))
     return np.array([*[of_rates] * 3, 1.0, *[of_gravity] * len(squares[4:])])

@@ -110,7 +110,7 @@ def whitening(variances: Array) -> Array:
 
 
 def whitened(whiteners: Array, residuals: Array) -> Array:
-    """Return residuals (…, N, 3) multiplied by whiteners W: independent ones, each of the standard deviation 1."""
+    """Return residuals (…, N, 3) times whiteners W, which makes them independent, with the standard deviation 1."""
     independent: Array = (whiteners @ residuals[..., None])[..., 0]
     return independent
 

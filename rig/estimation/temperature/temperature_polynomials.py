@@ -80,7 +80,7 @@ class OverTemperature:
         return ValuesAtTemperature(rows @ self.coefficients, std, coverage_factors(dof) * std)
 
     def correct_to_reference(self, readings: Array, temperature_c: Array) -> Array:
-        """Return readings (N, 3) corrected from their temperatures (N,) to the reference."""
+        """Return readings (N, 3) corrected from their temperatures (N,) to the reference temperature."""
         relative, added = self.changes(temperature_c)
         moved: Array = relative * (readings - added - self.zero) + self.zero
         return moved

@@ -1,4 +1,4 @@
-"""Certificates in a history, within a caller's transaction: entered once by number, and read by run."""
+"""Certificates in a history: each number is entered once, and a run's certificates are read. The caller commits."""
 
 from sqlalchemy import Connection, insert, select
 

@@ -57,7 +57,7 @@ def _origin(document: ResultDocument) -> dict[str, object]:
 
 
 def _numbers_of(document: ResultDocument) -> dict[str, object]:
-    """Return the numbers of a result as JSON, with checks keyed by name, so that added checks shift no others."""
+    """Return the numbers of a result as JSON, with checks keyed by name, so that an added check shifts no others."""
     fields: dict[str, object] = json.loads(document.text())
     checks = {check.name: [check.value, check.limit, check.uncertainty] for check in document.checks}
     return {**{name: value for name, value in fields.items() if name != "provenance"}, "checks": checks}

@@ -1,4 +1,4 @@
-"""Changes since another calibration of the same sensor, in sentences. Pure."""
+"""Changes from one calibration of a sensor to another calibration of this sensor, in sentences. Pure."""
 
 from collections.abc import Iterable, Sequence
 from math import pi

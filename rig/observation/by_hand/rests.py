@@ -99,7 +99,7 @@ def _find_steady_blocks(still: NDArray[np.bool_], pairs: NDArray[np.bool_]) -> N
 
 
 def _mask_blocks(times: Array, windows: Sequence[Window]) -> NDArray[np.bool_]:
-    """Return a mask (count,) of blocks inside any window; `times` (count, width) are those of the blocks' readings."""
+    """Return a mask (count,) of blocks inside any window; `times` (count, width) are the times of all readings."""
     mask = np.zeros(len(times), dtype=np.bool_)
     for window in windows:
         first, last = np.searchsorted(times[:, 0], window.start_s), np.searchsorted(times[:, -1], window.end_s, "right")

@@ -223,7 +223,7 @@ def _slow_line_variance(slow: Array, weights: Array, residuals: Array) -> Array:
 
 
 def _explain_by_step(residuals: Array) -> float:
-    """Return the largest part of the sum of squares of residuals (n, 3) that one step explains, wherever it is."""
+    """Return the largest part of the sum of squares of residuals (n, 3) that one step, at any place, explains."""
     before = np.arange(1, len(residuals))[:, None]
     sums = np.cumsum(residuals - residuals.mean(axis=0), axis=0)[:-1]
     return float(np.sum(sums**2 * (1 / before + 1 / (len(residuals) - before)), axis=1).max())

@@ -99,7 +99,7 @@ def average_transfers(
 
 
 def find_transfer(motion: ArmMotion, start_s: float, end_s: float) -> MotionInterval | None:
-    """Return the interval from before the arm moves until it has stopped; None if it does not move in the window."""
+    """Return the interval from before the arm moves until the arm has stopped; None for a window without motion."""
     inside = (motion.time_s >= start_s) & (motion.time_s <= end_s)
     rates, smoothed = _rate_norms(motion, motion.time_s[inside])
     moving = motion.time_s[inside][(rates > MIN_RATE_RAD_S) & (smoothed > MIN_RATE_RAD_S / 2)]

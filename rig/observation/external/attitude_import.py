@@ -197,7 +197,7 @@ def average_placements(samples: Samples, table: Mapping[str, Array], *, find_clo
 
 
 def _drop_frozen(rows: "_ReferenceRows", time_s: Array, rate: Array) -> tuple["_ReferenceRows", tuple[Omitted, ...]]:
-    """Return the rows without those of a reference that had stopped, and what is left out."""
+    """Return the rows without rows in which the reference had stopped, and an entry for the rows left out."""
     fresh = rows.select(np.flatnonzero(~find_frozen(rows.rows_s, rows.attitudes, time_s, rate)))
     return fresh, tuple(_list_omitted(rows, fresh, FROZEN))
 

@@ -143,7 +143,7 @@ def _check_metadata(path: Path) -> None:
 
 
 def _select_topic(reader: Any, types: Sequence[str], topic: str | None, what: str) -> Any:
-    """Return the connections of the named topic; without a name, of the only topic of these message types."""
+    """Return the connections of the topic called `topic` or, if that is None, of the only topic of these types."""
     connections = [connection for connection in reader.connections if connection.msgtype in types]
     if topic is not None:
         connections = [connection for connection in connections if connection.topic == topic]

@@ -69,7 +69,7 @@ class Revolution:
 
     @property
     def speed_std_rad_s(self) -> float:
-        """Standard deviation of the mean speed, due to that of the duration."""
+        """The standard deviation of the mean speed, due to the error of the duration."""
         return self.speed_rad_s * self.duration_std_s / self.duration_s
 
 

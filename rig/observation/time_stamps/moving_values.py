@@ -27,7 +27,7 @@ def find_least_ahead(values: Array, width: int) -> Array:
 
 
 def find_least_behind(values: Array, width: int) -> Array:
-    """Return for each of `values` (n,) the minimum (n,) of itself and the `width` − 1 values before it."""
+    """Return the minima (n,) of `width` values that end with each value."""
     return find_least_ahead(values[::-1], width)[::-1]
 
 

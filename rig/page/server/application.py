@@ -1,4 +1,4 @@
-"""The page's routes: its files, the event stream, the certificate, and two that control the run."""
+"""The page's routes: its files, the event stream, the certificate, and two routes that control the run."""
 
 import json
 from collections.abc import Awaitable, Callable
@@ -65,7 +65,7 @@ async def body_of(request: Request) -> bytes:
 
 
 def run_routes(broadcast: Broadcast, control: Control, door: Door, folder: Path) -> list[Route]:
-    """Return the routes of a run in `folder`: its certificate, and the two that control the run."""
+    """Return the routes of a run in `folder`: the certificate, and the two routes that control the run."""
 
     async def certificate(request: Request) -> Response:
         if not door.may_open(request.headers, request.cookies):

@@ -7,7 +7,7 @@ from rig.page.server.feed import frame_of
 
 
 class Sections:
-    """The page's content, passed from the thread that puts it to the server's thread."""
+    """The page's content, which one thread changes and the server's thread reads."""
 
     ended = False
 

@@ -79,7 +79,7 @@ class Block:
 
     @property
     def macro(self) -> str:
-        """The template macro in the file."""
+        """The name of the template's macro: `macro_path` after the file's name."""
         return self.macro_path.partition(":")[2]
 
 

@@ -1,4 +1,4 @@
-"""Omitted parts of a recording, and notes on how it was read and solved: entries and lines."""
+"""Omitted parts of a recording, and notes on how the recording was read and solved: entries and lines."""
 
 from collections.abc import Iterator
 from typing import TYPE_CHECKING

@@ -41,7 +41,7 @@ def outlets(
 
 
 def terms_of(document: ResultDocument, outlet: Outlet | None = None) -> Iterator[Term]:
-    """Yield all characteristics in a result, kind by kind, or only those that `outlet` shows."""
+    """Yield all characteristics in a result, kind by kind, or only those that the form of output `outlet` shows."""
     for kind in kinds():
         for finding in kind.find(document):
             yield from terms(kind.characteristics, finding, outlet)

@@ -124,7 +124,7 @@ def _name(certificate: bytes) -> str:
 
 
 def _lists(reader: PdfFileReader) -> list[CertificateList]:
-    """Return the revocation lists in the document, which its signature covers."""
+    """Return the revocation lists in the document; the document's signature covers these lists."""
     try:
         streams = reader.root["/DSS"]["/CRLs"]
     except KeyError:

@@ -72,7 +72,7 @@ class BoardCalibration:
 
     @contextmanager
     def look_in_background(self, sweep: Sweep) -> Iterator["Future[Attempts[str, Revolution]]"]:
-        """Compute the windows of the revolution in a thread; yield their future."""
+        """Find the revolution of each sensor in a thread; yield the future of these revolutions, by sensor."""
         pool = ThreadPoolExecutor(max_workers=1)
         try:
             yield pool.submit(self.revolutions, sweep)

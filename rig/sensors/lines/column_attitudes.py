@@ -46,7 +46,7 @@ def list_angles(layout: TableLayout) -> list[int]:
 
 
 def find_matrices(layout: TableLayout, values: Array) -> list[int]:
-    """Return the columns of rotation matrices; nine adjacent columns are the elements of one, by rows or by columns."""
+    """Return the columns of rotation matrices: nine adjacent columns are a matrix, row by row or column by column."""
     numbers, matrices = set(layout.numbers), list[int]()
     for start in layout.numbers:
         indices = [*range(start, start + 9)]

@@ -1,4 +1,4 @@
-"""Columns of an unknown log whose names are those of a sensor, but that are not read, and why."""
+"""Columns of an unknown log that have names of a sensor's columns but are not read, and the reasons."""
 
 import re
 from collections.abc import Collection, Sequence

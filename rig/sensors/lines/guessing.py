@@ -146,7 +146,7 @@ def _find_time(shape: Shape, guess: Guess) -> None:
 
 
 def _set_time(guess: Guess, index: int, column: Array, unit: str) -> None:
-    """Enter the column as the time in `unit`, with its wrap and the rate of the lines, into the guess."""
+    """Enter the column into the guess as the time in `unit`, with the number at which it wraps and the lines' rate."""
     wrap = _wrap(column)
     if wrap is None and (unit in {"s", "ns"} or column.max() >= 2**32):
         wrap = 0

@@ -248,7 +248,7 @@ def _make_triad(
 
 
 def _make_thermometer(lines: LinesSection, *, provides: bool) -> Iterator[tuple[Channel, _Printed]]:
-    """Yield the channel of the printed or else of the stated temperature, with its columns; nothing without both."""
+    """Yield the channel of the printed or else of the stated temperature, with its columns; nothing without either."""
     printed, printed_channel = None, _Printed(())
     if provides and "temperature" in lines.columns:
         temperature = lines.temperature

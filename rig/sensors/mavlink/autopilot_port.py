@@ -1,4 +1,4 @@
-"""The port to an autopilot: a serial port, a TCP connection, or datagrams that it sends to this computer."""
+"""The port to an autopilot: a serial port, a TCP connection, or datagrams from the autopilot to this computer."""
 
 import socket
 import time

@@ -32,7 +32,7 @@ class BusError(Exception):
 
 
 class ReplyLost(BusError):
-    """A missing reply, or a `damaged` one."""
+    """The loss of a reply, which did not arrive or, if `damaged`, arrived damaged."""
 
     def __init__(self, damaged: bool) -> None:
         super().__init__("a damaged reply" if damaged else "no reply")

@@ -111,7 +111,7 @@ class SimulatedImu:
 
 
 def orientation_rotation(number: float) -> Vector:
-    """Return the rotation (3, 3) of the board orientation `number`. Raise ValueError for one that is not simulated."""
+    """Return the rotation (3, 3) of the board orientation `number`. Raise ValueError if it is not simulated."""
     if int(number) not in ORIENTATIONS:
         raise ValueError(f"the simulated autopilot has no orientation {number:g}")
     rotation = np.eye(3)

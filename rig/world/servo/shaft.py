@@ -35,7 +35,7 @@ class Shaft:
         return ProfileStart(time_s, segment.angle_at(time_s), segment.rate_at(time_s))
 
     def follow(self, time_s: float, segments: Sequence[ProfileSegment]) -> None:
-        """Follow `segments` after `time_s`, instead of the planned ones."""
+        """Follow `segments` after `time_s`, instead of the segments planned so far."""
         stands = ProfileSegment(time_s, time_s, self.start_at(time_s).angle_rad, 0.0)
         gap = self._gap_at(time_s)
         last = self._index(time_s)

@@ -133,7 +133,7 @@ class ChildLink:
         self._process.join(1.0)
 
     def _read(self) -> None:
-        """Receive the child's messages until it ends, and report an unexpected end."""
+        """Receive the child's messages until the child ends, and report an unexpected end."""
         try:
             while True:
                 message = self._pipe.recv()

@@ -49,7 +49,7 @@ class StopOrder:
             self._changed.wait_for(lambda: not self._unanswered, timeout_s)
 
     def await_program_end(self) -> bool:
-        """Wait for a report that the program has ended; return whether one came in the order's time."""
+        """Wait for a report that the program has ended; return whether this report came before the time limit."""
         with self._changed:
             self._changed.wait_for(lambda: self._ended or not self._active, max(0.0, self._remaining_s))
         self.await_delivery()
@@ -146,7 +146,7 @@ class ArmStop:
         self.descriptors = SpareDescriptors()  # reserve before the arm is under control
 
     def carry_out(self) -> StopOutcome:
-        """Stop the arm and return its state, within 1 s."""
+        """Stop the arm and return the outcome, within 1 s."""
         began_s = time.monotonic()
         # In a thread of its own: a child that does not read must not delay the stop over the controller's ports.
         threading.Thread(target=self._send, args=(BrakeRequest(BRAKE_RAD_S2),), name="arm brake", daemon=True).start()

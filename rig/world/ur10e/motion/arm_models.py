@@ -117,7 +117,7 @@ MODELS: Mapping[ModelName, ArmModel] = MappingProxyType(
 
 
 def select_model(section: SimulatedArmSection, configured: ModelName) -> ArmModel:
-    """Return a simulated laboratory's arm model, by default the one `configured`, restricted by its safety settings."""
+    """Return the arm model of a simulated laboratory, by default `configured`, with the limits that `section` sets."""
     model = MODELS[section.model or configured]
     if section.joint_limits_deg is not None:
         model = replace(model, limit_rad=tuple(map(radians, section.joint_limits_deg)))
