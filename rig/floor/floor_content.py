@@ -94,7 +94,7 @@ def recalls(pasts: Sequence[Past], today: date) -> list[dict[str, Any]]:
 
 
 def _read(text: str) -> dict[str, Any]:
-    """Return a station's state, shortened for a card; empty for an invalid text."""
+    """Return a station's state, shortened for the station's card on the page; empty for an invalid text."""
     try:
         if len(text) > MAX_STATE:
             raise ValueError(f"it is longer than {MAX_STATE} characters")

@@ -128,7 +128,7 @@ class Result(Mapping[str, Calibration]):
 
 
 def solve(run: Run | str | Path, estimator: str | None = None, **changes: float) -> Result:
-    """Solve and judge a run, as `rig solve` does, by `estimator` or that of its procedure.
+    """Solve and judge a run, as `rig solve` does, by `estimator` or by the procedure's own estimator.
 
     `run` is loaded if it is a path. `changes` are thresholds or limits to use instead of the recorded ones:
     `max_lost_fraction=0.01`. Raise Fault and Refused as `rig solve` and `load` do; Refused `unknown_setting` lists the

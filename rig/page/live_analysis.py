@@ -1,7 +1,7 @@
 """Analyses the recordings of a running run, in a process of its own: `python -m rig.page.live_analysis FOLDER`.
 
-For each line on standard input it answers with a line of JSON: the rows of observations and parameters so far. In the
-run's process an estimator would delay the threads that take samples; this process may be slow.
+The process answers each line on standard input with a line of JSON: the rows of observations and parameters so far. In
+the run's process an estimator would delay the threads that take samples; this process may be slow.
 """
 
 import json

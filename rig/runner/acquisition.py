@@ -176,7 +176,7 @@ class Acquisition:
         return np.concatenate(batches or [np.empty(0, self.counts[sensor].sensor.sample_dtype)])
 
     def samples(self) -> tuple[SensorSamples, ...]:
-        """Return the counts of every sensor so far."""
+        """Return the numbers of samples and of lost samples of every sensor so far."""
         with self._lock:
             return tuple(count.summary for count in self.counts.values())
 

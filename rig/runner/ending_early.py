@@ -108,7 +108,7 @@ class EndingEarly:
         return self.sweeps // self.repeats
 
     def _note_repeat_end(self, pose: Joints, sweeps_left: int) -> None:
-        """Mark an assessment as due if the arm is at home, or if the remaining plan has a motion home from its pose."""
+        """Note the repeats left; an assessment is due if `pose` is home or the remaining plan has a motion home."""
         self._repeats_left = -(-sweeps_left // self._per_repeat)
         self._home = next(
             (

@@ -1,4 +1,4 @@
-"""The comparison of the board's own solution with one in double precision from the same observations. Pure functions.
+"""The comparison of the board's own solution with a double-precision one from the same observations. Pure functions.
 
 Board and host average the same samples (the board reports which) and use the same speeds, so that only the arithmetic
 differs. If a sample was lost on its way to the host, the board's own mean replaces the host's. The run's calibration

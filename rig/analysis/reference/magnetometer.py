@@ -141,7 +141,7 @@ def _drift(name: str, recordings: Sequence[ObservedRun], settings: RunSettings) 
 
 
 def _solve(solve: Callable[..., TriaxialSolution]) -> TriaxialSolution:
-    """Return the solution. Raise Fault `field_not_uniform` for residuals that attitudes cannot cause."""
+    """Return what `solve` returns. Raise Fault `field_not_uniform` for residuals that attitudes cannot cause."""
     try:
         return solve(method=ESTIMATOR)
     except Fault as fault:

@@ -24,7 +24,7 @@ def run_simulated_laboratory(config_text: str, late: Path | None = None, truth: 
     The world writes the causes of late steps to the file `late`, or to stderr, and the truth on request to `truth`.
 
     The world ends when its standard input closes, so it cannot outlive this process. Raise Refused: `only_on_linux`,
-    the world's own refusal, or `world_not_ready` if it ends without one.
+    the world's own refusal, or `world_not_ready` if the world ends without a refusal.
     """
     refuse_unless_linux("the simulated laboratory")
     files = {"--late": late, "--truth": truth}

@@ -52,8 +52,8 @@ def add(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     """Run parts until none follows.
 
-    Return 0 if all passed in the end, 1 if one did not. Raise Refused `missing_extra`, `not_confirmed`, and
-    what `load_configured`, `claim_devices`, `numbers_in` and `open_journal` raise.
+    Return 0 if all parts passed in the end, else 1. Raise Refused `missing_extra`, `not_confirmed`, and what
+    `load_configured`, `claim_devices`, `numbers_in` and `open_journal` raise.
     """
     from rig.batch.label import refuse_without_library
     from rig.batch.operators import Operator, refuse_without_terminal

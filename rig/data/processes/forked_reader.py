@@ -21,7 +21,7 @@ HDF5_PLUGINS = {"HDF5_PLUGIN_PRELOAD": "::"}  # no plugins: a foreign file must 
 def can_fork() -> bool:
     """Return whether a reading process may be forked from this one.
 
-    HDF5 looks for plugins when it is loaded, so only `load_hdf5` may have loaded it here.
+    HDF5 looks for plugins when it is loaded, so in this process nothing but `load_hdf5` may have loaded HDF5.
     """
     if sys.platform != "linux" or not hasattr(os, "pidfd_open") or ("h5py" in sys.modules and not load_hdf5()):
         return False

@@ -112,7 +112,7 @@ def _vertical_on_face(centre: Array, face: int) -> tuple[Array, Array]:
 def _rest_equations(centre: Array, rest: BoardRest, noise_rad_s: float) -> Iterator[Equation]:
     """Yield the equations of a rest, whose reading is bias plus gravity's effect.
 
-    Their unknowns are the step (33,) from the values `centre` (33,), about which they are linearised.
+    The unknowns are the step (33,) from the values `centre` (33,), about which the equations are linearised.
     """
     up, _ = _vertical_on_face(centre, rest.face)
     sensitivity = centre[GRAVITY].reshape(3, 3)

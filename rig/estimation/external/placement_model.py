@@ -4,8 +4,8 @@
 
 ε, independent in each placement, and η are the errors of `rig.estimation.external.placement`. γ is a smooth function of
 the attitude R: a Gaussian process over the angle between attitudes with Matérn's correlation (ν = 3/2). A robot with
-wrong joint zeros or a wrong tool frame has such errors, or a box that is out of square. γ may look like a bias or like
-other scale factors, so more placements reduce the effect of γ less than that of ε.
+wrong joint zeros or a wrong tool frame has such errors, and so has a box that is out of square. γ may look like a bias
+or like other scale factors, so more placements reduce the effect of γ less than that of ε.
 """
 
 import numpy as np

@@ -128,7 +128,10 @@ def _reduce_jacobian(theta: Array, attitudes: Array, v_bar: Array, whiteners: Ar
 
 
 def covariance_bound(theta: Array, attitudes: Array, v_bar: Array, whiteners: Array, *, norm_known: bool) -> Array:
-    """Return the Cramér–Rao bound (…, p, p) of the parameters: the inverse of the Fisher information."""
+    """Return the Cramér–Rao bound (…, p, p) of the parameters: the inverse of the Fisher information.
+
+    `norm_known`: True if the norm of the reference is given.
+    """
     free = free_directions(theta, norm_known=norm_known)
     reduced = _reduce_jacobian(theta, attitudes, v_bar, whiteners, free)
     size = np.linalg.norm(reduced, axis=-2, keepdims=True)

@@ -160,7 +160,8 @@ def _find_long_run_covariance(residuals: Array, scatter: Array, coloured: Callab
     """Return the long-run covariance (3, 3) of residuals (n, 3), by their autocorrelation along principal axes.
 
     A vibration is along one principal axis and averages out almost entirely, unlike the noise along the other two.
-    Along x, y, z the noise would seem to have the vibration's correlation.
+    Along x, y, z the noise would seem to have the vibration's correlation. `scatter` (3, 3) is the covariance of the
+    residuals; `coloured` takes a series and returns the factor by which its correlation changes a mean's variance.
     """
     variances, directions = np.linalg.eigh(scatter)
     projected = residuals @ directions

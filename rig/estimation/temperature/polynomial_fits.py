@@ -158,7 +158,7 @@ class ParameterFits:
             m = offset + x (1/r − 1) + c + hysteresis + lag · dT/dt · ∂m/∂T,   r = 1 + q(T)
 
         x are the inputs along the axis in the readings' unit; `values` contain the coefficients of the polynomials q
-        and c, the size of the hysteresis, and the lag.
+        and c, which have the given `orders`, the size of the hysteresis, and the lag.
         """
         of_scale, of_bias = orders
         per_axis = (len(values) - 1) // 3

@@ -136,7 +136,7 @@ def _fast_length(least: int) -> int:
 def _compute_explained_shares(
     turning: Array, filled: NDArray[np.bool_], moving: Array, lags: NDArray[np.intp]
 ) -> tuple[Array, Array]:
-    """Return `share` and `fraction` of a `_Match` (k,) at each lag (k,), in bins; 0 if too few bins overlap the motion.
+    """Return `share` (k,) and `fraction` (k,) of a `_Match` at each of `lags`, in bins; 0 if too few bins overlap.
 
     The arm's rate (3, m) explains the board's rate (3, n) by a linear map, over the bins that are `filled` (n,). The
     normal equations are precise enough, because the best lag is only the start of the fine fit.

@@ -241,7 +241,7 @@ def _angle_between_rad(one: Array, other: Array) -> float:
 def _read(
     time_s: Array, readings: Mapping[Quantity, Array], cuts: Sequence[NDArray[np.intp]]
 ) -> tuple[RestMeans, NDArray[np.intp]]:
-    """Return the means of the rests, and the samples of knocks.
+    """Return the means of the rests, and the indices of the samples in knocks; `cuts` are the samples of each rest.
 
     The variance of a rest with few samples is computed from the noise of the other rests.
     """

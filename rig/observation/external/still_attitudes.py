@@ -1,6 +1,7 @@
 """The rests of a body as a reference's attitudes show them: a long row, or successive short rows of equal attitude.
 
-A reference that stops for some time repeats its last attitude, which looks like a rest, but the gyroscope turns.
+A reference that stops for some time repeats its last attitude, which looks like a rest; the gyroscope shows that the
+body turned.
 """
 
 import numpy as np

@@ -137,7 +137,7 @@ def _describe_extent(sweep: Sweep) -> str:
 
 
 def _find_ends(time_s: Array, travelled: Array, first: int, last: int, turn_rad: float) -> tuple[float, float, float]:
-    """Return the start and end of the revolution, and the standard deviation of the time between, s.
+    """Return the start of the revolution, its end, and the standard deviation of the time between them, s.
 
     The angle is interpolated between two neighbouring states. If states are missing there, the joint may have been
     accelerating. Then the straight line through the whole revolution gives the time, with the ripple as its error.

@@ -56,7 +56,7 @@ def decimals(uncertainties: Sequence[float], fewest: int = MIN_DECIMALS) -> int:
 
 
 def line_of(term: Term, lead: str, form: str, width: str = ".2g") -> str:
-    """Return a characteristic's numbers and their largest U in a line that begins with `lead`."""
+    """Return a line: `lead`, a characteristic's numbers in the format `form`, their largest U in the format `width`."""
     _, values, widths = zip(*term.printed, strict=True)
     unit, words = term.units.shown.name, factor_words(term.numbers.dof)
     return f"{lead}: {triple(values, form)} {unit} (± {max(widths):{width}}, {words})"

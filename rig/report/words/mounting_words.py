@@ -1,6 +1,6 @@
 """The measured mounting of the item in each stage of a run, in words. Pure.
 
-If each stage turns the item about only one axis, its mounting is not measured, and there are no lines.
+If each stage turns the item about only one axis, the mounting is not measured, and no words are yielded.
 """
 
 from collections.abc import Iterator

@@ -239,7 +239,7 @@ class HandSession:
         self.note(HandMoveAccepted(*self._board_us(move), kind, before, face, self._accepted[-1].turns))
 
     def _refuse_move(self, wrong: Fault, move: Move | None, rest: HandRest) -> bool:
-        """Omit the move, the rest, or everything before, depending on the fault. Return whether the rest is kept.
+        """Omit the move, the rest, or everything before, depending on the fault `wrong`; return whether the rest stays.
 
         If the bias has changed at a single rest, the item may have crept, and the rest is omitted. If it has changed at
         the next rest too, the bias itself jumped. Raise a fault that no move can correct.

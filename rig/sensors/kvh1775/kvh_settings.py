@@ -44,7 +44,7 @@ class Kvh1775Settings:
 
     @property
     def settings(self) -> Mapping[str, str]:
-        """The settings to correct, by name."""
+        """The values that the run needs, by the names of the instrument's settings."""
         return {
             "MSYNC": "IMU",
             "DR": f"{self.rate_hz:g}",

@@ -245,7 +245,7 @@ def _time_entry(layout: TableLayout, time: Array | None) -> dict[str, Any]:
 def _find_wrap(time: Array) -> int | None:
     """Return the power of two, in steps, at which a time counter restarts; None if it does not.
 
-    A counter restarts close below a power of two; a time that falls as far from elsewhere, as if it lost a digit, is no
+    A counter restarts close below a power of two. A fall by as much from another value, as if a digit were lost, is no
     restart.
     """
     time = time[np.isfinite(time)]

@@ -186,7 +186,7 @@ def _find_columns(
 
 
 def _split_prefix(fields: list[list[str]]) -> tuple[str, list[list[str]]]:
-    """Return the common text before the first number, with `*` for changing digits, and the rows without it."""
+    """Return the common text before the first number, with `*` for changing digits, and the rows without this text."""
     split = [_BEFORE_A_NUMBER.fullmatch(row[0]) for row in fields]
     texts = {match.group(1) for match in split if match is not None}
     patterns = {re.sub(r"\d+", "*", text) for text in texts}

@@ -45,7 +45,7 @@ class Dashboard:
         """Stop the running program, and with it the arm.
 
         In local control the controller refuses the command, and its answer becomes the `refusal`. If no program runs,
-        it answers that the command failed, which does not count as a refusal.
+        the controller answers that the command failed, which does not count as a refusal.
         """
         answer = self.ask("stop")
         self.acknowledged = answer == STOPPED_ANSWER
