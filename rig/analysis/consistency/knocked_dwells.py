@@ -17,6 +17,7 @@ def compare_dwell_halves(
     dwells: Sequence[RawDwell], flicker_counts: float, false_alarm_probability: float, steps: Steps
 ) -> Mapping[str, Statistic]:
     """Return by check the largest difference between a long dwell's halves, as χ² of three axes, and its limit.
+
     The limit is a quantile of the F distribution, because the noise is estimated from the dwells' readings. Flicker
     with the Allan deviation `flicker_counts` makes the halves differ by √2 times this deviation. A slow oscillation
     that no encoder measures affects every dwell, a knock only one dwell, so the mean square of the other dwells'
