@@ -98,7 +98,7 @@ class Outcome:
 
     @property
     def verdict(self) -> Literal["pass", "fail"]:
-        """The verdict: "pass" if there are checks and all passed."""
+        """The verdict: "pass" if there are checks and all passed, else "fail"."""
         from rig.analysis.verdict import verdict
 
         return verdict(self.checks)

@@ -171,7 +171,7 @@ def drift_checks(
 
 
 def verdict(checks: Sequence[Check]) -> Literal["pass", "fail"]:
-    """Return "pass" if there are checks and all passed."""
+    """Return "pass" if there are checks and all passed, else "fail"."""
     return "pass" if checks and all(check.passed for check in checks) else "fail"
 
 

@@ -93,7 +93,7 @@ def compare(run: Run, sensor: str, reference: str) -> SensorComparison:
 
 
 def _correction_of(run: Run, name: str, recordings: Sequence[ObservedRun]) -> Reference:
-    """Return the calibration that corrects a sensor: the turntable's or the run's; no change if already corrected.
+    """Return the calibration that corrects a sensor: the turntable's, the run's, or none for corrected readings.
 
     Raise Refused `nothing_to_compare` if the run has no calibration.
     """

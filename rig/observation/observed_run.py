@@ -149,7 +149,7 @@ def _start_time(recording: ObservedRun) -> datetime:
 
 
 def _find_superseded(runs: Sequence[RunData], index: int) -> frozenset[int]:
-    """Return the sweeps and dwells that later recordings of the same stage repeat."""
+    """Return the sweeps and dwells that recordings after `index`, of the same stage, contain completely."""
     stage = runs[index].settings.stage
     return frozenset[int]().union(*(_complete_steps(run) for run in runs[index + 1 :] if run.settings.stage == stage))
 

@@ -107,7 +107,7 @@ def turn_mean(readings: Array, steps: Steps, turn: SampledTurn) -> tuple[Mean, A
 
 
 def _gain(weights: Array) -> float:
-    """Return how many times more noise the angles cause in a mean rate with weights (1, n) than in the plain mean."""
+    """Return the noise that the angles cause in a mean rate with weights (1, n), divided by that in the plain mean."""
     return float(np.linalg.norm(np.diff(weights[0], prepend=0.0, append=0.0)) * weights.size / np.sqrt(2))
 
 

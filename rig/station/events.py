@@ -115,7 +115,7 @@ class StepStarted:
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """The progress of the run, many times in each step: the `fraction` of the step (0 to 1), and times by the plan."""
+    """The progress of the run, sent often: the `fraction` of the step (0 to 1), and times elapsed and remaining."""
 
     number: int
     count: int

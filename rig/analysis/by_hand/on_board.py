@@ -45,7 +45,7 @@ class HandAgreement:
 def compare_with_board(
     readings: BoardReadings, reports: Sequence[HandReport], solved: BoardHandSolution
 ) -> HandAgreement:
-    """Return how the board's solution agrees with one in double precision from the same readings.
+    """Return how the board's solution agrees with a solution in double precision from the same readings.
 
     Raise Fault `board_unverified` if readings or reports are missing, `board_disagrees` if the limits are exceeded.
     """

@@ -150,7 +150,7 @@ class ShortestRun:
     directions: Array | None
 
     def least(self, size: str) -> Budgets:
-        """Return the budgets of the run with the smallest U called `size`, a field of `ReachedUncertainty`."""
+        """Return the budgets of the run in which the U called `size`, a field of `ReachedUncertainty`, is smallest."""
         return min(self.endless, key=lambda candidate: float(getattr(candidate.reached, size)))
 
     @property

@@ -89,7 +89,7 @@ def predict_readings(accelerometer: PlannedAccelerometer) -> ReferenceModel:
 
 
 def _segment(timed_step: Timed[Dwell] | Timed[Sweep]) -> ReferenceWindow:
-    """Return a dwell or a sweep at constant temperature."""
+    """Return the window of a planned dwell or sweep, at constant temperature."""
     step = timed_step.step
     wrist = step.joint - WRIST_1 if isinstance(step, Sweep) else None
     q_rad = step.first_q_rad if isinstance(step, Sweep) else step.q_rad

@@ -137,7 +137,7 @@ def lever_arms_m(turns: Sequence[Observation], extension_m: Array, mount: Array 
 
 
 def _axis_errors(turns: Sequence[Observation], rests: int, axis_deg: float) -> Array:
-    """Return the errors (P, N, 3) of the arm's angles, with the half-width `axis_deg`, as in `VectorInputs`."""
+    """Return `axis_errors_rad_s` (P, N, 3) of `VectorInputs`, for angles of the arm with the half-width `axis_deg`."""
     steady = np.array([name.startswith(("twist", "zero")) for name in AXIS_ERRORS])
     std = np.radians(axis_deg) / np.sqrt(3) * np.where(steady, 1.0, WAVE_RATIO)
     errors = [std[:, None] * turn.speed_rad_s * turn.axis_errors for turn in turns if turn.axis_errors is not None]

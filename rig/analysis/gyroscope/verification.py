@@ -20,7 +20,7 @@ from rig.observation.observed_run import ObservedRun
 
 @dataclass(frozen=True, slots=True)
 class Verification:
-    """How uncalibrated readings (`before`, None if not recorded) and calibrated ones compare with a reference.
+    """The comparison of uncalibrated (`before`, None if not recorded) and of calibrated readings with a reference.
 
     `reference_error_rad_s`: the largest error of the norm of the reference's mean rate. The arm shows the true norm,
     2π/T over a revolution and zero over a rest.

@@ -74,7 +74,7 @@ class PartSpec:
 
     @property
     def angle_random_walk_rad_sqrt_s(self) -> float:
-        """The standard deviation of the angle after 1 s by white noise alone, rad/√s."""
+        """The standard deviation of the angle after 1 s due to white noise alone, rad/√s."""
         return radians(self.angle_random_walk_deg_sqrt_h) / 60
 
     @property

@@ -63,7 +63,7 @@ class RecordedSensor:
 
     @property
     def unseen_change_k(self) -> float:
-        """The possible unrecorded change of the sensor's temperature, K, below the thermometer's step."""
+        """The change of temperature, K, that may be unrecorded: a step of the thermometer, or an assumed change."""
         return self.channel(TEMPERATURE).resolution if self.measures(TEMPERATURE) else UNKNOWN_CHANGE_K
 
     @property

@@ -1,4 +1,4 @@
-"""The comparison of the gyroscope's axes with the accelerometer's, by the axes of flips."""
+"""The comparison of the gyroscope's axes with the accelerometer's, by the axes about which flips turn the body."""
 
 import numpy as np
 

@@ -123,7 +123,7 @@ class RestFaces:
 
 
 def drop_rests(session: HandRecording, rows: Collection[int]) -> HandRecording:
-    """Return the session without the rests `rows`, in which the body crept; the moves around each are merged."""
+    """Return the session without the rests `rows`, in which the body crept; the moves around such a rest are merged."""
     kept = [row for row in range(len(session.rests)) if row not in rows]
     return replace(
         session,

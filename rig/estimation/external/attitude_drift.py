@@ -336,7 +336,7 @@ def _find_bias_changes(sensitivities: Array, nearby: Array, middles_s: Array, we
 
 
 def _expand_axes(covariance: Array) -> Array:
-    """Return the covariance (3n, 3n) of n vectors whose components have `covariance` (n, n) each."""
+    """Return the covariance (3n, 3n) of n vectors whose x components have `covariance` (n, n), as y and z have too."""
     return np.asarray(np.kron(covariance, np.eye(3)), dtype=np.float64)
 
 

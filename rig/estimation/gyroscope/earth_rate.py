@@ -89,7 +89,7 @@ class EarthRate:
 
     @property
     def latitude_rad(self) -> float:
-        """The latitude: from the angle to the vertical, or from the horizontal part if the vertical part is fixed."""
+        """The latitude: from the rate's angle to the vertical; if `vertical_fixed`, from the rate's horizontal part."""
         return float(np.arcsin(self.up @ self.rate_rad_s / self.norm_rad_s))
 
     @property
@@ -110,7 +110,7 @@ class EarthRate:
 
     @property
     def heading_std_rad(self) -> float | None:
-        """The standard deviation of the heading; None if the base's x axis is vertical."""
+        """The standard deviation of the heading of the base's x axis; None if this axis is vertical."""
         level = self._level()
         if level is None:
             return None

@@ -92,7 +92,7 @@ def _link(before: str, line: Mapping[Any, Any]) -> str:
 
 
 def broken(connection: Connection) -> Iterator[Broken]:
-    """Yield rows that differ from the journal or are not in the journal, and gaps and breaks of the chain."""
+    """Yield rows that differ from the journal or are not in the journal, and gaps and breaks of the journal's chain."""
     remaining = {
         (name, json.dumps(tuple(key))): (table, tuple(key))
         for name, table in ENTRY_TABLES.items()
@@ -116,7 +116,7 @@ def broken(connection: Connection) -> Iterator[Broken]:
 
 
 def unlike(connection: Connection, table: Table, *key: int | str) -> Broken | None:
-    """Return the difference of the row with this primary key from the journal; None if there is no difference."""
+    """Return the difference of the row with the primary `key` from the journal; None if there is no difference."""
     lines = schema.journal.c
     query = select(lines.sha256).where(lines.kind == table.name, lines.key == json.dumps(key))
     entered = connection.scalar(query)

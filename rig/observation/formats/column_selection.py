@@ -45,7 +45,7 @@ def map_samples(columns: ColumnMap) -> MappedColumns | None:
 
 
 def map_motion(columns: ColumnMap) -> MappedColumns | None:
-    """Return the column map of a file of sweeps or attitudes, or None, as `map_samples` does."""
+    """Return the column map of a file of sweeps or attitudes; None if the user gave none."""
     return _unless_empty(
         _build_map(columns.motion, columns.motion_skip_lines, columns.motion_rate_hz, columns.motion_missing)
     )

@@ -33,7 +33,7 @@ class KnownMotion(Protocol):
 
     @property
     def rate(self) -> RateFunction:
-        """The rates at times within `time_s`."""
+        """The function that returns the rates at times within `time_s`."""
         ...
 
     def covered(self, time_s: Array) -> NDArray[np.bool_]:

@@ -77,7 +77,7 @@ def swept_acceleration(
 
 
 def turn_harmonic(sweep: Sweep, turn: Revolution, harmonic: FirstHarmonic) -> SweptAcceleration:
-    """Return the first harmonic of a sweep together with the arm's attitude, axis and station."""
+    """Return the first harmonic of a sweep together with the arm's attitude, the joint's axis, and the station."""
     return SweptAcceleration(
         sweep=sweep.index,
         joint=sweep.joint,

@@ -1,4 +1,4 @@
-"""The least and the mean of the values around each value of a series."""
+"""The minimum, or the mean, of the values around each value of a series."""
 
 import numpy as np
 

@@ -26,7 +26,7 @@ FIRST_PACE = pace_of(30, 60)
 
 
 def approach(start_q_rad: Joints | None, home: Joints, pace: Pace) -> Plan:
-    """Return the slow motion home from the turner's pose; empty if that is unknown or is home."""
+    """Return the slow motion home from the turner's pose; empty if the pose is unknown, or is home."""
     start = home if start_q_rad is None else start_q_rad
     speed_rad_s = min(pace.speed_rad_s, FIRST_PACE.speed_rad_s)
     acceleration_rad_s2 = min(pace.acceleration_rad_s2, FIRST_PACE.acceleration_rad_s2)

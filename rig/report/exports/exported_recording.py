@@ -47,7 +47,7 @@ class WithMotion:
         return self.observed.time_s(sensor)
 
     def since_s(self, sensor: str) -> Array:
-        """Return the times (n,) of all samples of a sensor since the first state, s."""
+        """Return the times (n,) of all samples of a sensor since the turner's first state, s."""
         since_s: Array = self.time_s(sensor) - self.observed.motion.time_s[0]
         return since_s
 

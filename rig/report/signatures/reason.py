@@ -12,7 +12,7 @@ _ANCHOR = re.compile(r"journal entry (\d+), SHA-256 ([0-9a-f]{64})$")
 
 @dataclass(frozen=True, slots=True)
 class Reason:
-    """The reason in a signature. It may contain the journal's last entry in the history (`anchor`)."""
+    """The reason that a signature states. The reason may contain the last entry of the history's journal (`anchor`)."""
 
     text: str
 

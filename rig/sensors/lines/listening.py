@@ -70,7 +70,7 @@ def _find_speed(port: str, tell: Callable[[str], None]) -> int:
 
 
 def _read_at(port: str, baud: int) -> bytes:
-    """Return the bytes that arrive at this speed within TRIED_S, about 2000 at most; empty if the port fails."""
+    """Return the bytes that arrive at `baud` within TRIED_S, about 2000 at most; empty if the port fails."""
     serial = open_device_port(port, baud)
     try:
         serial.read()  # discard input received at another speed

@@ -1,4 +1,4 @@
-"""A map of the columns of an unknown log, in the form of `--columns`, by headings and plausible numbers."""
+"""A map of the columns of an unknown log, in the form of `--columns`, guessed from headings and plausible numbers."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence

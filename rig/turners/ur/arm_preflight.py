@@ -135,7 +135,7 @@ def kinematics_problems(arm: ArmSection, report: ArmReport) -> list[Problem]:
 
 
 def make_recorded(arm: ArmSection, report: ArmReport) -> TurnerIdentity:
-    """Return the arm to record, with the configured geometry. Raise Refused `no_kinematics`, `kinematics_disagree`."""
+    """Return the arm as it is recorded, with its geometry. Raise Refused `no_kinematics`, `kinematics_disagree`."""
     refuse(kinematics_problems(arm, report))
     return TurnerIdentity(MAKER, identify_model(report), _geometry(arm, report), report.tcp_offset)
 

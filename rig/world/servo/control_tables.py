@@ -191,7 +191,7 @@ class ServoMemory:
 
 
 def find_write_error(memory: ServoMemory, write: Write, senses_current: bool, firmware: int) -> int:
-    """Return the error of a value that the servo's present state does not permit; 0 if it does.
+    """Return the error number of a value that the servo's present state does not permit; 0 for a permitted value.
 
     A goal is out of range while the watchdog's error is active (bus_watchdog.md, step 6). After a shutdown only a
     reboot brings torque back (shutdown.md; the manual does not state the error number).

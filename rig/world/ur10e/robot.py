@@ -211,7 +211,7 @@ class Robot:
 
     @property
     def is_polyscope_x(self) -> bool:
-        """Whether the controller's software is PolyScope X, which has no dashboard; later versions have a Robot API."""
+        """Whether the software is PolyScope X, which has no dashboard, but in its later versions a Robot API."""
         return self.identity.polyscope >= POLYSCOPE_X
 
     @property
