@@ -74,7 +74,7 @@ def field_angle_dof(result: "MagnetometerResult") -> Array:
 def reversal_dof(reversal: "MagnetometerReversal") -> tuple[Array, Array]:
     """Return the degrees of freedom of the mean scale factors (3,), and of bias and arm's field (6,).
 
-    Bias and field have those of the run whose bias has the fewest, because a sum of independent parts has no fewer.
+    For bias and field, this is the smallest number of any run's bias, because a sum of independent parts has no fewer.
     """
     budgets = [run.result.budget for run in reversal.runs]
     # Welch–Satterthwaite: u⁴ / ν = Σ u_i⁴ / ν_i. Errors common to the runs have infinite ν and add nothing.

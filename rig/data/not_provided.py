@@ -27,7 +27,7 @@ class Absent:
     def mask_provided(self, values: ArrayLike, flags: ArrayLike = -1) -> NDArray[np.bool_]:
         """Return a mask of the values (n,) or (n, 3) that the source provided; `flags` (n,) are those of the messages.
 
-        Without flags, −1 stands for all fields being flagged as provided.
+        The default, −1, flags all fields as provided.
         """
         numbers = np.asarray(values, dtype=np.float64)
         low, high = self.within

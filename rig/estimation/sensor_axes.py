@@ -21,7 +21,7 @@ IN_PAIR = np.abs(AXIS_ORDER)
 
 @dataclass(frozen=True, slots=True)
 class SensorAxes:
-    """The axes of a sensor: `scale` (3,), unit vectors as rows of `axes` (3, 3), the rotation nearest to `axes`."""
+    """The axes of a sensor: `scale` (3,), unit vectors as rows of `axes` (3, 3), `mounting` (the nearest rotation)."""
 
     scale: Array
     axes: Array

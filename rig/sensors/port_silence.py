@@ -1,6 +1,6 @@
 """The silence of a sensor with a port of its own: the time for which reads of the port brought nothing.
 
-If the time of another instrument, such as the turner, is known, the silence is at most the time that passed there.
+If another instrument's clock is known, such as the turner's, the silence is at most the time that passed on that clock.
 """
 
 from dataclasses import dataclass

@@ -206,7 +206,7 @@ class HandSeen:
 
 @dataclass(frozen=True, slots=True)
 class ObservationMade:
-    """The host has averaged a revolution of `sensor`; all are reported again after the verdict on its calibration."""
+    """The host has averaged a revolution of `sensor`; after the verdict, all revolutions are reported again."""
 
     sensor: str
     observation: Observation

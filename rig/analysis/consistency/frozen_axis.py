@@ -13,7 +13,7 @@ MIN_CHANGE_STEPS, MIN_CHANGE_RAD_S = 10.0, 0.02  # of the rate about the axis, i
 
 
 def find_longest_frozen(recording: ObservedRun, name: str) -> int:
-    """Return the number of equal readings in a row, at most, of a gyroscope's axis while the true rate changed.
+    """Return the largest number of equal readings in a row on an axis of a gyroscope while the true rate changed.
 
     The true rate is computed with the nominal mounting, because a tilted axis or a wrong scale factor hardly alters a
     change of rate.

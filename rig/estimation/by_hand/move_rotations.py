@@ -52,7 +52,7 @@ class GyroscopeModel:
 
 
 def integrate_moves(session: HandRecording, gyroscope: GyroscopeModel, up: Array) -> MoveIntegrals:
-    """Return the rotation in each move, integrated from the readings, and its derivatives by parameters of `gyroscope`.
+    """Return each move's rotation, integrated from the readings, and its derivatives with respect to `gyroscope`.
 
     `up` (N, 3) is the vertical in the body at each rest.
     """

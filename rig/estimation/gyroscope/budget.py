@@ -161,7 +161,7 @@ def _contributors(explained: VectorFit, unknown: UnknownErrors) -> Iterator[Cont
     matrix = solution.matrix
 
     def propagate(patterns: Array) -> Array:
-        """Return the covariance (6, 6) of scale and bias due to k independent errors of the readings, `patterns`."""
+        """Return the covariance (6, 6) of scale and bias due to independent errors `patterns` (k, N, 3) of readings."""
         effects = np.einsum("qni,kni->kq", solution.response, patterns)
         covariance: Array = effects.T @ effects
         return covariance

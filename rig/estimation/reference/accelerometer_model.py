@@ -328,7 +328,7 @@ def _read(changes: Array, s: Array, theta: Array, movement: Movement) -> Array:
 
 
 def _product(one: Array, other: Array, movement: Movement) -> Array:
-    """Return the elementwise product (K, 3, …); in sweeps the product of two series, without its second harmonic."""
+    """Return the elementwise product (K, 3, …); in sweeps the Fourier series' product, without its second harmonic."""
     count = len(movement.dwells.readings_m_s2)
     mean, cos, sin = np.moveaxis(_harmonics_of_sweeps(one, movement), 1, 0)
     others = np.moveaxis(_harmonics_of_sweeps(other, movement), 1, 0)

@@ -130,7 +130,7 @@ def _draw(unexplained: Unexplained) -> Residuals:
 
 
 def contributions(budget: BudgetEntry, scale: Sequence[float]) -> Contributions:
-    """Return the plot of each contributor's standard uncertainty over the combined one; ratios begin at 1e-4."""
+    """Return the plot of each contributor's standard uncertainty divided by the combined one, from 1e-4 to 1."""
     k, b = find_printed_indices(budget, scale)
     across = (WIDTH - NAMES - RIGHT_MARGIN) / DECADES
 

@@ -129,7 +129,7 @@ class Kvh1775Source:
             )
 
     def _temperatures_c(self, messages: NDArray[Any]) -> Array:
-        """Return the temperatures (n,), °C, NaN for messages without temperature; format C has it in one of four."""
+        """Return the temperatures (n,), °C, NaN for messages without one, which are three of four in format C."""
         if self._required.message == "C":
             celsius = np.where(messages["sequence"] % 4 == 0, messages["fourth"].astype(np.float64), np.nan)
         else:

@@ -61,7 +61,7 @@ class Message:
 
 
 class ProgramError(Exception):
-    """An error in a program, which the controller stops with a pop-up. `position`: line and column, if known."""
+    """An error for which the controller stops a program with a pop-up. `position`: line and column, if known."""
 
     def __init__(self, text: str, position: tuple[int, int] = (0, 0)) -> None:
         super().__init__(text)
