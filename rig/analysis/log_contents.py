@@ -35,7 +35,7 @@ class LookedFile:
     - samples, survey: its readings, if any can be read; others: number of rows without readings; note: what the
       readings lack.
     - origin_s: origin of the readings' times; the attitudes' times are on their own clock.
-    - attitudes: the reports of its reference, if it has one; omitted_attitudes: its rows that are no reports.
+    - attitudes: the reports of a reference, if the file has one; omitted_attitudes: the rows that are no reports.
     - refusals: why readings or attitudes could not be read.
     """
 
@@ -187,7 +187,7 @@ def _map_of(layout: TableLayout, guess: LogColumns) -> dict[str, Any]:
 
 
 def _read_contents(looked: LookedFile, column_map: ColumnMap, *, has_readings: bool, has_attitudes: bool) -> LookedFile:
-    """Return the file with its readings and attitudes; what cannot be read becomes one of its `refusals`."""
+    """Return `looked` with its readings and attitudes, or with the reasons why these cannot be read as `refusals`."""
     refusals: list[RigError] = []
     if has_readings:
         try:

@@ -1,4 +1,4 @@
-"""A station's heartbeat: writes its state to a shared history, in a thread of its own that delays nothing.
+"""A station's heartbeat, which writes the station's state to a shared history, in a thread that delays nothing.
 
 If the history does not answer, the thread tries again. The station works without the history, and meanwhile the floor
 shows the station as silent.

@@ -143,7 +143,7 @@ class SensorSamples:
 class ArmSeen:
     """The arm's newest state, and the number of missed states (None: not counted).
 
-    It comes with every `Progress`, and once more when the arm is released.
+    This event comes with every `Progress`, and once more when the arm is released.
     """
 
     state: State

@@ -8,7 +8,7 @@ from rig.station.events import Answered, ListenerDropped, Prompt, RunEvent
 
 
 class Listener(Protocol):
-    """A receiver of all events, which must not block. If it raises, it gets no more events."""
+    """A receiver of all events, which must not block. A receiver that raises an error gets no more events."""
 
     def event(self, event: RunEvent) -> None: ...
 

@@ -106,7 +106,7 @@ class MagnetometerPart:
         return nearest_rate(rate_hz, self.rates_hz, list_numbers(self.rates_hz))
 
     def accept_range(self, range_gauss: float) -> float:
-        """Return `range_gauss` if the part has it. Raise ValueError with the nearest otherwise."""
+        """Return `range_gauss` if the part has this range. Otherwise raise ValueError with the part's nearest range."""
         return one_of(range_gauss, self.ranges_gauss)
 
 

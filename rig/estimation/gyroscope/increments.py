@@ -178,8 +178,8 @@ class _IncrementSteps:
     def differentiate(self, inverse: Array) -> Array:
         """Return the derivatives (k, 3, 3) of the steps' rotations with respect to the readings' integrated error.
 
-        The rotation is in body coordinates at the start. The attitude half-way is used for the whole step, which for a
-        step by the angle φ causes a relative error of about φ²/24.
+        The rotation is in body coordinates at the start. The attitude half-way through a step is used for the whole
+        step, which causes a relative error of about φ²/24 for a step by the angle φ.
         """
         return np.asarray(-_matrices(self.vectors / 2) @ inverse, dtype=np.float64)
 

@@ -72,7 +72,7 @@ def _places(connection: Connection) -> Mapping[int, tuple[tuple[str, str], ...]]
 
 
 def _certificates(connection: Connection) -> Mapping[int, tuple[IssuedCertificate, ...]]:
-    """Return the certificates in force: those that are valid (without marks) and not replaced in this history."""
+    """Return the certificates in force: those without marks on their pages, and not replaced in this history."""
     rows = connection.execute(select(schema.certificate).order_by(schema.certificate.c.id)).all()
     replaced_numbers = {row.replaces for row in rows if not row.marks}  # an invalid one does not replace a valid one
     return _group_by_run(

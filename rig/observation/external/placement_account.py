@@ -128,7 +128,7 @@ class Account:
             yield Omitted("rows", len(moving), total, "not_at_rest: the body moves in them", where)
 
     def _find_gaps_s(self, rows: NDArray[np.bool_]) -> Array:
-        """Return the longest gaps (N,), s, in the `rows` without a rest; 0 for other rows and gaps up to `BLOCK_S`."""
+        """Return the longest gaps (N,), s, in those `rows` that show no rest; 0 for other rows, and up to `BLOCK_S`."""
         gaps_s = np.zeros(len(rows))
         for row in np.flatnonzero((self.rest < 0) & rows).tolist():
             longest_s = float(np.diff(self._list_edges_s(row)).max())

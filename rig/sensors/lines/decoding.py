@@ -154,7 +154,7 @@ class LineReader:
     def _match_checksums(
         raw: NDArray[np.uint8], text: NDArray[np.uint8], starts: NDArray[np.intp], ends: NDArray[np.intp]
     ) -> NDArray[np.bool_]:
-        """Return a mask of lines with a correct checksum `*hh` (XOR); in `text` blank checksum and initial `$` or `!`."""
+        """Return a mask of lines with a correct checksum `*hh` (XOR); blank it, and an initial `$` or `!` in `text`."""
         star = np.maximum(ends - 3, 0)
         high, low = _HEX[raw[ends - 2]], _HEX[raw[ends - 1]]
         body_starts = starts + np.isin(raw[starts], np.frombuffer(b"$!", np.uint8))
