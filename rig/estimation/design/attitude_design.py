@@ -154,7 +154,7 @@ def _spiral(count: int) -> Array:
     """Return quaternions (count, 4) spread evenly over all rotations (Alexa, Super-Fibonacci spirals, CVPR 2022)."""
     step = np.arange(count) + 0.5
     inner, outer = np.sqrt(step / count), np.sqrt(1 - step / count)
-    first, second = 2 * np.pi * step / np.sqrt(2), 2 * np.pi * step / 1.533751168755204288118041
+    first, second = 2 * np.pi * step / np.sqrt(2), 2 * np.pi * step / 1.533751168755204288118041  # root of ψ⁴ = ψ + 4
     return np.stack(
         [inner * np.sin(first), inner * np.cos(first), outer * np.sin(second), outer * np.cos(second)], axis=1
     )

@@ -288,6 +288,7 @@ def _rises(column: Sequence[str]) -> bool:
     except (ValueError, ArithmeticError):
         return False
     falls = (steps < 0).sum() <= max(2, MAX_LATE_FRACTION * len(steps))
+    # Coarse times are equal in most rows, so a tenth of the steps must rise.
     return len(steps) > 1 and bool(falls and (steps > 0).mean() > 0.1 and np.median(steps) >= 0)
 
 

@@ -312,6 +312,6 @@ def find_resolution_s(time_s: Array) -> float:
     since_s = time_s - time_s[0]
     for unit_s in reversed(units):
         scaled = since_s / unit_s
-        if np.abs(scaled - np.rint(scaled)).max() < 1e-3:
+        if np.abs(scaled - np.rint(scaled)).max() < 1e-3:  # rounding errors of the stamps
             return unit_s
     return 0.0

@@ -96,9 +96,9 @@ def _draw_pushes(
     """Return start, duration and angle of every push, and the end of the last one."""
     count = max(1, round(rng.integers(habits.pushes_a_turn[0], habits.pushes_a_turn[1] + 1) * angle / (2 * np.pi)))
     pushes = []
-    for part in rng.dirichlet(np.full(count, 20.0)):
+    for part in rng.dirichlet(np.full(count, 20.0)):  # nearly equal parts
         peak = np.radians(habits.peak_deg_s) * rng.uniform(0.7, 1.0)
-        lasting_s = float(np.clip(2 * part * angle / peak, 0.15, 20.0))
+        lasting_s = float(np.clip(2 * part * angle / peak, 0.15, 20.0))  # a raised cosine's peak is twice its mean
         pushes.append((begins_s, lasting_s, part * angle))
         begins_s += lasting_s + rng.uniform(*habits.pause_s)
     return pushes, pushes[-1][0] + pushes[-1][1]

@@ -193,7 +193,7 @@ def read_move(name: str, value: Arguments) -> ScriptMove:
     target = value("0", "pose" if name == "movel" else "q")
     if not isinstance(target, (list, tuple)) or len(target) != 6:
         raise ProgramError(f"{name}: six joint angles or a pose expected, got {target}")
-    speed, acceleration = (0.25, 1.2) if name == "movel" else (1.05, 1.4)
+    speed, acceleration = (0.25, 1.2) if name == "movel" else (1.05, 1.4)  # URScript's defaults
     numbers = tuple(float(number) for number in target)
     speed, acceleration = float(value("2", "v", speed)), float(value("1", "a", acceleration))
     return ScriptMove(numbers, speed, acceleration, straight=name == "movel", is_pose=isinstance(target, tuple))
