@@ -87,7 +87,7 @@ class Bus:
     def more_came(self, wait_s: float) -> bool:
         """Return whether another byte arrives within `wait_s`, without a request."""
         with self._failing():
-            for _ in range(max(1, round(wait_s / 0.002))):
+            for _ in range(max(1, round(wait_s / 0.002))):  # a read waits `READ_WAIT_S` of `servo_port`
                 if self._port.readPort(1):
                     return True
         return False
