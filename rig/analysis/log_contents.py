@@ -89,7 +89,7 @@ def look_at(path: Path, stated: ColumnMap | None = None) -> LookedFile:
 
 
 def find_pair(looks: Sequence[LookedFile]) -> tuple[LookedFile | None, LookedFile | None]:
-    """Return the file with readings and the file with attitudes, with one origin of times; None if one is missing."""
+    """Return the file with readings and the file with attitudes, None if missing; both count times from one origin."""
     log = next((looked for looked in looks if looked.samples is not None), None)
     reference = _find_reference(looks)
     return log, reference if log is None or reference is None else _count_from(reference, log.origin_s)

@@ -41,7 +41,7 @@ class Origin:
 
 
 def origin_of(runs: "Sequence[RunData]") -> Origin:
-    """Return equipment and times of the recordings of a run, at least one; the solution's time is now.
+    """Return the equipment and the times of a run, from at least one recording; the time of the solution is now.
 
     `resumed_utc` does not list recordings that begin a new stage, in which the item was remounted.
     """

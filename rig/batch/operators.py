@@ -62,7 +62,7 @@ class Operator:
         return self._agrees("again", f"{part.serial}: again? yes, or no to put it aside:", f"{part.serial}: {error}")
 
     def agrees(self, announcement: Sequence[str], to_do: str) -> bool:
-        """Ask whether the announced run may start. Without a voice, return True."""
+        """Ask whether the announced run may start. Without an operator, return True."""
         return self.voice is None or is_agreed(self.voice, question_before(announcement, to_do))
 
     def print_outcome(self, part: BatchPart) -> None:

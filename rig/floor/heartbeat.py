@@ -63,7 +63,7 @@ class Heartbeat:
                     return
 
     def _write_until_over(self, engine: "Engine") -> bool:
-        """Write until the end; then return True."""
+        """Write the station's state regularly, and at once after a change; return True after the last state."""
         while True:
             over = self._over.is_set()
             self._changed.clear()

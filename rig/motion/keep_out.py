@@ -102,7 +102,7 @@ def _measure_to_forearm(
 def _measure_to_upper_arm(
     q_rad: Array, carried: FlangeLoad, model: TurnerModel, arm: DenavitHartenberg | None = None
 ) -> tuple[str, float]:
-    """Return the nearest part of the load to the upper arm in the poses (N, 6), and its distance, m."""
+    """Return the part of the load that is nearest to the upper arm in any of the poses (N, 6), and its distance, m."""
     names, points = _list_load_points(carried)
     offset_m, lengths = model.upper_arm.offset_m, arm or model.nominal
     return _find_nearest(names, distance_to_upper_arm(q_rad, points, lengths, offset_m=offset_m))

@@ -74,7 +74,10 @@ def estimate_bias_drift(rests: Sequence[Average]) -> Array:
 
 
 def _average_rest(stream: Stream, motion: ArmMotion, window: Window, response: Array) -> Average | None:
-    """Return the average of a rest; None if the arm moved in it or if it holds too few samples."""
+    """Return the average of a rest; None if the arm moved in it or if it holds too few samples.
+
+    `response` (3, 3) maps the flange's rates to readings, and serves to remove the arm's oscillation.
+    """
     still = trim_rest(motion, window)
     if still is None:
         return None

@@ -83,7 +83,7 @@ class Lines:
 
 
 def turn_mean(readings: Array, steps: Steps, turn: SampledTurn) -> tuple[Mean, Array]:
-    """Return the mean of readings (n, 3) with resolution `steps`, and its weights (n,), also for the arm's rates."""
+    """Return the mean of readings (n, 3) with resolution `steps`, and the weights (n,) for the arm's rates too."""
     ones = whole(readings)
     steady = np.column_stack([ones, turn.regressors])
     lines = _find_turn_lines(readings, steady, turn)

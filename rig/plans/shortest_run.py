@@ -241,7 +241,7 @@ class _TurnerSearch:
         return candidates
 
     def _counts(self, plan: Plan) -> Mapping[str, int]:
-        """Return the number of waits of each key in a plan."""
+        """Return the number of waits in a plan whose duration a key states, for each key of `waits`."""
         # By their names: a field test is a Rest as well, but its duration has another key.
         rests = sum(step.name.startswith("rest") for step in plan.steps)
         return {key: {"rest_s": rests, "dwell_s": len(plan.dwells)}[key] for key in self.waits}

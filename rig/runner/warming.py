@@ -126,16 +126,16 @@ class Warming:
 
     @property
     def is_due(self) -> bool:
-        """Whether the next set may begin."""
+        """Whether the next set of sweeps and dwells may begin."""
         return self.course.is_due(self.now_c())
 
     def begin_set(self) -> None:
-        """Begin to average the temperatures of the next set."""
+        """Begin to average the temperatures during the next set of sweeps and dwells."""
         self._began_s = self._looked_s
         self._of_set = []
 
     def end_set(self, first: int, end: int) -> None:
-        """End the set with the sweeps and dwells from index `first` up to `end`."""
+        """End the set whose sweeps and dwells have the indices from `first` up to, not including, `end`."""
         if self._of_set:
             means = {name: float(np.mean([now_c[name] for now_c in self._of_set])) for name in self.names}
             measured = SetMeasured(first, end, bool(self.course.warming), means)
@@ -153,7 +153,7 @@ class Warming:
             self.heater.keep_heating(0.0)
 
     def _farthest_c(self, now_c: Mapping[str, float]) -> float:
-        """Return the temperature of the sensor that is farthest from the end of the range."""
+        """Return the temperature of the sensor that lags most: the coldest while warming, the warmest while cooling."""
         return max(now_c.values()) if self.course.warming is False else min(now_c.values())
 
     def _refuse_hot(self, now_c: Mapping[str, float]) -> None:

@@ -44,7 +44,7 @@ class PortSilence:
             self._idle_reads, self._clock_then_s = 0, self._clock_s
 
     def measure_s(self, clock_s: float | None) -> float:
-        """Return the duration of the silence, s; `clock_s` is another instrument's time, None to keep the last one."""
+        """Return the duration of the silence, s; `clock_s` is the turner's time now, None to use its last one."""
         self._clock_s = self._clock_s if clock_s is None else clock_s
         return self.lasts_s
 

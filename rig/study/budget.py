@@ -72,7 +72,11 @@ class Effects:
 
 @dataclass(frozen=True, slots=True)
 class Session:
-    """The arm's motion: attitudes (N, 72, 3, 3) base to flange, rates (N, 3) and lever arms (N, 3) in the flange."""
+    """The arm's motion in N windows.
+
+    There are 72 attitudes in each window (N, 72, 3, 3), from the base's frame to the flange's. Rates (N, 3) and lever
+    arms (N, 3) are in the flange's frame.
+    """
 
     attitudes: Array
     rates_rad_s: Array

@@ -133,7 +133,7 @@ def _simulate_rate_table(runs: int, rng: np.random.Generator, _: int) -> dict[st
 
 
 def _compare(errors: Array, bound: Array) -> Array:
-    """Return the mean squares (2, p) of `errors` (R, p) over R runs, divided by the bound's diagonal and absolute."""
+    """Return mean squares (2, p) of `errors` (R, p) over R runs: first over the bound's diagonal, then absolute."""
     return np.array([efficiency(errors, bound), np.mean(errors**2, axis=0)])
 
 

@@ -118,7 +118,7 @@ def single_axis_columns(segments: Segments, axis_rates: Array) -> Array:
 
 
 def quarter_columns(means: Means) -> Array:
-    """Return the effects (3, N, 9) of a scale factor that changes after 1, 2 or 3 quarters of the recording."""
+    """Return the effects (3, N, 9) of a change of each scale factor after one, two and three quarters of the time."""
     middle, (begin, end) = means.times_s.mean(axis=1), (means.times_s.min(), means.times_s.max())
     edges = np.linspace(begin, end, 5)[1:-1]
     return np.concatenate([split_per_axis(means.sensed_rad_s * (middle > edge)[:, None]) for edge in edges], axis=2)

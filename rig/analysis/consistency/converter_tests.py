@@ -43,7 +43,7 @@ MAX_STEP_COUNTS = 1.5  # readings in larger steps are not those of a converter
 
 @dataclass(frozen=True, slots=True)
 class Digits:
-    """The recorded numbers of a source: the steps between them, in counts, and whether they have bits to test."""
+    """The recorded numbers of a source: their `steps` in counts, and whether their bits can be tested (`has_bits`)."""
 
     has_bits: bool
     steps: Steps

@@ -45,7 +45,7 @@ def compare_dwell_halves(
 
 
 def _vibration_variances(differences: Array, noise: Array) -> Array:
-    """Return the mean square of all other dwells' `differences` (N, 3), minus the `noise` (3,), for each dwell."""
+    """Return for each of N dwells the mean square of the other dwells' `differences` (N, 3), minus the `noise` (3,)."""
     beyond = (differences**2 - noise).mean(axis=1)
     others: Array = np.maximum((beyond.sum() - beyond) / max(len(beyond) - 1, 1), 0.0)
     return others

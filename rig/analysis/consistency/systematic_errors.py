@@ -149,7 +149,7 @@ def build_error_patterns(
 ) -> ErrorPatterns:
     """Return the patterns of known errors in the means of a sensor with matrix F (3, 3).
 
-    In transfers, which are faster than sweeps, the even part of the nonlinearity is free.
+    In transfers, which are faster than sweeps, the even part of the nonlinearity counts as unknown.
     """
     on_transfers = replace(known_errors, curve=replace(known_errors.curve, square=1.0))
     instability_rad_s = 0.0 if known_errors.sensor is None else known_errors.sensor.instability_rad_s
@@ -330,7 +330,10 @@ def _mount_patterns(segments: Segments, mount_rad: float) -> list[Array]:
 
 
 def _nonlinearity_patterns(intervals: Sequence[MotionInterval], matrix: Array, curve: NonlinearityPrior) -> Array:
-    """Return the mean effects (6, N, 3) in N intervals of one std of the axes' odd parts, then of their even parts."""
+    """Return the effects (6, N, 3) of nonlinearity on the means of N intervals.
+
+    Each effect is that of one prior standard deviation: of the odd parts of x, y, z, then of their even parts.
+    """
     ends_s = np.array([(interval.start_s, interval.end_s) for interval in intervals])
     edges_s = np.linspace(ends_s[:, 0], ends_s[:, 1], TRANSFER_STEPS + 1, axis=1)
     middles_s = (edges_s[:, 1:] + edges_s[:, :-1]) / 2

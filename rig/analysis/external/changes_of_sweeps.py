@@ -30,9 +30,9 @@ def check_sweeps_steady(data: ExternalData) -> None:
 
 
 def estimate_changes(data: ExternalData, matrix: Array) -> Array:
-    """Return the covariance (12, 12) that the changes over the rows add to `matrix`, row by row, and bias.
+    """Return the covariance (12, 12) of the elements of `matrix`, row by row, and bias, due to changes of the sensor.
 
-    The covariance includes an abrupt change, and bias changes from rest to rest; it is zero if the rows show no change.
+    The rows may show an abrupt change, and changes of the bias from rest to rest; if not, the covariance is zero.
     """
     change = data.change
     abrupt = change.find_covariance(matrix) if change is not None and _must_include(change) else np.zeros((12, 12))

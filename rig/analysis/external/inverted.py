@@ -43,9 +43,9 @@ def solve_unless_inverted(attitudes: Array, solve: Callable[[Array], Solved], co
 
 
 def _find_convention(attitudes: Array, solve: Callable[[Array], Solved]) -> Fault | None:
-    """Return the error for reordered or for inverse quaternions, whichever agree with the readings; None if none do.
+    """Return the error for reordered or for inverse quaternions if `solve` succeeds with the corrected ones, else None.
 
-    If both agree, the one that brings the sensor's axes near the body's is right.
+    If it succeeds with both corrections, the one that brings the sensor's axes nearer to the body's is right.
     """
     inverted = or_fault(lambda: solve(np.swapaxes(attitudes, -1, -2)))
     reordered = or_fault(lambda: solve(_read_scalar_last(attitudes)))
@@ -57,7 +57,7 @@ def _find_convention(attitudes: Array, solve: Callable[[Array], Solved]) -> Faul
 
 
 def _read_scalar_last(attitudes: Array) -> Array:
-    """Return the attitudes (N, 3, 3) whose quaternions were written x y z w and read as w x y z."""
+    """Return the right attitudes (N, 3, 3) if those given were written as quaternions x y z w, but read as w x y z."""
     from scipy.spatial.transform import Rotation
 
     read = Rotation.from_matrix(attitudes).as_quat()[:, [3, 0, 1, 2]]

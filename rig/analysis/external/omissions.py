@@ -82,7 +82,7 @@ def notes_on_scale(scale: Array) -> Iterator[str]:
 
 
 def _are_whole(turned: Array, part: float) -> bool:
-    """Return whether there are angles (k,), and each is a whole multiple, 1 or more, of `part`."""
+    """Return whether all angles `turned` (k,), at least one, are whole multiples of `part`, 1 or more."""
     multiples = np.rint(turned / part)
     return bool(len(turned) and (multiples > 0).all() and (np.abs(turned / part / multiples - 1) < MAX_ERROR).all())
 

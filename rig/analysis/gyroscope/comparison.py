@@ -209,7 +209,7 @@ def _summarise_errors(errors: Sequence[Array]) -> Deviation:
 
 
 def _estimate_noise(rests: Sequence[Array]) -> Array | None:
-    """Return the standard deviation (3,) within the rests, about the mean of each; None without rests."""
+    """Return the standard deviation (3,) of the readings at rest about the mean of their rest; None without rests."""
     long_enough = [rest for rest in rests if len(rest) >= MIN_SAMPLES_AT_REST]
     if not long_enough:
         return None

@@ -79,7 +79,7 @@ def _estimate_mounts(recordings: Sequence[ObservedRun], settings: RunSettings) -
 def _rotation_in_stage(fit: VectorFit, index: int) -> tuple[Array, Array]:
     """Return the item's rotation (3,) in a stage relative to the first, and its standard deviations.
 
-    All are in units of the stated standard deviation. A rotation of the item rotates all sensed rates oppositely.
+    Both are in units of the mounts' stated standard deviation. A rotation of the item rotates sensed rates oppositely.
     """
     size = len(fit.mounts)
     pick = np.zeros((3, size))

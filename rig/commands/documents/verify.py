@@ -107,7 +107,10 @@ def _read_content(file: Path) -> bytes:
 def _look_up(
     named: str, contents: Mapping[Path, bytes], looks: "Mapping[Path, FileInspection]"
 ) -> "dict[Path, FileEntries]":
-    """Return the history's entry of each file. Raise Refused `history_unreachable`, and what `open_history` raises."""
+    """Return the entries of each file in the history that is `named`.
+
+    Raise Refused `history_unreachable`, and what `open_history` raises.
+    """
     from rig.commands.history.history_answer import await_answer
     from rig.history.entered_file import find_file_entries
     from rig.history.storage.address import resolve_address

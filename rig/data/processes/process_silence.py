@@ -48,7 +48,7 @@ class Silence:
         self.ticks += not (starved or unheard)
 
     def lasts_over(self, limit: float) -> bool:
-        """Return whether more than `limit` ticks were silent, or more than `spared` × `limit` passed in all.
+        """Return whether more than `limit` ticks were silent, or more than `limit` × `spared` ticks passed in all.
 
         The `limit` is for a machine with a processor for every program; the machine's load extends it.
         """

@@ -84,7 +84,7 @@ def efficiency(errors: ArrayLike, bound: Array) -> Array:
 
 
 def _inverse(weighted: Array) -> Array:
-    """Return (JᵀJ)⁻¹, computed with columns of unit length."""
+    """Return (JᵀJ)⁻¹ of the `weighted` Jacobian J, computed with columns of unit length."""
     size = np.linalg.norm(weighted, axis=0)
     scaled = weighted / size
     inverse: Array = np.asarray(np.linalg.inv(scaled.T @ scaled) / np.outer(size, size), dtype=np.float64)

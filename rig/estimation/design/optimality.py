@@ -25,7 +25,10 @@ PARAMETER_COUNT: Mapping[Model, int] = {"squared": 6, "vector": 4}
 
 
 def prediction_variance(directions: ArrayLike, points: ArrayLike, model: Model = "squared") -> Array:
-    """Return N f(x)ᵀ (XᵀX)⁻¹ f(x) (M,) at `points` (M, 3) for a design `directions` (N, 3); inf if it is singular."""
+    """Return the prediction variance (M,) at `points` (M, 3) for sweeps in `directions` (N, 3); inf if singular.
+
+    It is N f(x)ᵀ (XᵀX)⁻¹ f(x) at a point x, with the terms f of the model, and X the terms of all directions as rows.
+    """
     x, f = _features(directions, model), _features(points, model)
     if np.linalg.matrix_rank(x) < x.shape[1]:
         return np.full(len(f), np.inf)
@@ -54,7 +57,7 @@ def maximum_prediction_variance(directions: ArrayLike, model: Model = "squared")
 
 
 def g_efficiency(directions: ArrayLike, model: Model = "squared") -> float:
-    """Return p over the worst prediction variance: 1 for a G-optimal design, 0 for a singular one."""
+    """Return the number of parameters over the worst prediction variance: 1 if G-optimal, 0 if singular."""
     return PARAMETER_COUNT[model] / maximum_prediction_variance(directions, model)
 
 

@@ -273,7 +273,10 @@ def _times_s(fixes: Fixes, increments: NDArray[np.bool_]) -> Array:
 
 
 def _build_result(settled: _ConvergedFit, aside_s: Array) -> IncrementSolution:
-    """Return the result of a converged fit; the bias is the mean over this recording's intervals."""
+    """Return the result of a converged fit; its bias is the mean over the intervals of this recording.
+
+    `aside_s` (k,) are the start times of the increments that were left out as outliers.
+    """
     solved, state = settled.solved, settled.state
     wanted = np.eye(len(solved.theta))[np.r_[MATRIX, EARTH, BIAS]]
     half_width = settled.model.expand(settled.maxima, wanted)

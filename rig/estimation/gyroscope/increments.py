@@ -121,7 +121,10 @@ def increments(time_s: Array, readings: Array, matrix: Array, bias: Array, windo
 
 
 def _split_into_blocks(time_s: Array, at_s: Array) -> Iterator[tuple[slice, slice]]:
-    """Yield readings in blocks, each with its instants; a block begins with the last reading of the previous one."""
+    """Yield two slices for each block: its readings, and the instants of `at_s` that lie among these readings.
+
+    A block begins with the last reading of the previous block.
+    """
     first = 0
     for start in range(0, len(time_s) - 1, BLOCK_READINGS):
         stop = min(start + BLOCK_READINGS + 1, len(time_s))
@@ -202,7 +205,7 @@ def _whole_steps(interval: _Interval) -> _IncrementSteps:
 
 
 def _steps_from(interval: _Interval, start: NDArray[np.intp], fraction: Array) -> tuple[_IncrementSteps, Array]:
-    """Return steps from the readings `start` (k,) over a `fraction` (k,) of an interval, and initial rates (k, 3)."""
+    """Return steps over a `fraction` (k,) of an interval from the readings `start` (k,), and their end rates (k, 3)."""
     u = fraction[:, None]
     h = np.diff(interval.time_s)[start][:, None]
     w0, w1, d0, d1 = (values[index] for values in (interval.rates, interval.slopes) for index in (start, start + 1))

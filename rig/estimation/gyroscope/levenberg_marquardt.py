@@ -112,7 +112,8 @@ def solve_levenberg_marquardt(
 
 
 def _conditioning(unit_means: Array, noise: float) -> refusals.Conditioning:
-    """Return the conditioning of Eq. (7)'s design for centred unit readings, whose squares have twice their `noise`."""
+    """Return the conditioning of the design of Eq. (7) for centred readings of RMS length 1 with this `noise`."""
+    # The square of a reading of length 1 has twice the noise of the reading.
     return refusals.condition_of(design(unit_means), 6, 2 * noise * float(np.sqrt(len(unit_means))))
 
 

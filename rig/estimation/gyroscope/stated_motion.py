@@ -45,7 +45,7 @@ class StatedMotion:
     def from_residuals(
         residuals_rad_s: Array, rates_rad_s: Array, variances_rad2_s2: Array, matrix: Array
     ) -> "StatedMotion":
-        """Return the motion with the patterns of its errors for a gyroscope with this `matrix` (3, 3)."""
+        """Return the stated motion, with the effects of its errors on a gyroscope that has this `matrix` (3, 3)."""
         speeds = np.linalg.norm(rates_rad_s, axis=1)
         tilts = np.zeros((2, *rates_rad_s.shape))
         for row in np.flatnonzero(speeds):

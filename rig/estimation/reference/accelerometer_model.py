@@ -104,7 +104,7 @@ class Movement:
 
     - `repeatability_rad`: std of each sweep's independent rotations; the sweeps of one station share all other errors.
     - `sensor_errors`: errors of the sensor itself; None if unknown.
-    - `arm_turns` (P, 3 N + 10 M): small rotations of N dwells and waves of M sweeps, in the order of the columns of
+    - `arm_turns` (P, 3 N + 10 M): the errors of N dwells (3 each) and M sweeps (10 each), ordered as the columns of
       `effects`, due to P constant errors of the arm, for δ = 1 rad; None if unknown.
     - `independent_fraction`: the fraction of δ² that is independent in each dwell.
     """
@@ -194,7 +194,7 @@ def _differentiate_lag(waves: Array, sweeps: Sweeps) -> Array:
 
 
 def project_lever_arm(delay_s: float, movement: Movement) -> Array:
-    """Return the matrices (K, 3, 3) from lever arm to acceleration; a constant speed affects only the means."""
+    """Return the matrices (K, 3, 3) that map a lever arm to its acceleration; a constant speed affects only means."""
     sweeps, now, change = movement.sweeps, slice(0, 2), slice(2, 4)
     turning = sweeps.turning_rad2_s2
     phase = (delay_s * sweeps.speeds_rad_s)[:, None, None]
@@ -202,7 +202,7 @@ def project_lever_arm(delay_s: float, movement: Movement) -> Array:
 
 
 def _around_axes(turning_rad2_s2: Array, movement: Movement) -> Array:
-    """Return the matrices (K, 3, 3) from lever arm to acceleration; `turning_rad2_s2` (M, 2, 3) are ω² and α in sweeps.
+    """Return the matrices (K, 3, 3) that map a lever arm to its acceleration, from ω² and α in sweeps (M, 2, 3).
 
     ω is the angular rate and α the angular acceleration, given by their mean, cosine and sine over the joint's angle.
     """
@@ -258,9 +258,9 @@ def jacobian(theta: Array, movement: Movement) -> Array:
 def effects(theta: Array, movement: Movement) -> Array:
     """Return the effect (3 K, P) of each of the arm's errors on the readings, per radian.
 
-    Each dwell has three errors. The sweeps of a station share ten errors: small rotations of flange and base, and the
-    joint's angle error A cos θ + B sin θ + C cos 2θ + D sin 2θ. The wrists' constant errors (`Movement.arm_turns`), if
-    known, come last and are common to all stations.
+    Each dwell has three errors. All sweeps of a joint in one pose (a station) share ten: small rotations of flange and
+    base, and the joint's angle error A cos θ + B sin θ + C cos 2θ + D sin 2θ. The wrists' constant errors
+    (`Movement.arm_turns`), if known, come last and are common to all stations.
     """
     return combine_effects(*split_effects(theta, movement), movement.independent_fraction)
 
@@ -274,7 +274,11 @@ def split_effects(theta: Array, movement: Movement) -> tuple[Array, Array | None
 
 
 def combine_effects(independent: Array, constant: Array | None, fraction: float) -> Array:
-    """Return the columns (3 K, P) of the arm's errors; a `fraction` of their variance is of the independent ones."""
+    """Return the effects (3 K, P) of the arm's errors: first of the `independent` ones, then of the `constant` ones.
+
+    The independent errors have a `fraction` of the variance, the constant errors the remainder. Without constant errors
+    (None), the independent errors have the whole variance.
+    """
     if constant is None:
         return independent
     return np.concatenate([np.sqrt(fraction) * independent, np.sqrt(1 - fraction) * constant], axis=1)
@@ -301,10 +305,10 @@ def arm_effects(theta: Array, movement: Movement) -> Array:
 def _differentiate_angle(apparent: Array, theta: Array, sweeps: Sweeps) -> Array:
     """Return the harmonics (3 M, 3, 4) of the specific force due to angle errors w: cos θ, sin θ, cos 2θ, sin 2θ.
 
-    With the joint's axis a, its rate ω and the lever arm p + r: gravity `apparent` changes by w times the derivative of
-    its first harmonic. The rate grows by ω w′, so the first two errors also add the first harmonics of the centripetal
-    acceleration 2 ω² w′ (a aᵀ − I) (p + r) and the Euler acceleration ω² w″ a × (p + r). The effect of the delay on
-    these is neglected.
+    Let a be the joint's axis, ω its rate, and p + r the lever arm from the axis to the sensor. Gravity (`apparent`)
+    changes by w times the derivative of its first harmonic. The rate grows by ω w′, so the first two errors also add
+    first harmonics of the centripetal acceleration, 2 ω² w′ (a aᵀ − I) (p + r), and of the Euler acceleration,
+    ω² w″ a × (p + r). The effect of the delay on these is neglected.
     """
     axes, arms, squares = sweeps.axes_flange, sweeps.arms_m + theta[LEVER], sweeps.speeds_rad_s[:, None] ** 2
     _, cos, sin = np.moveaxis(apparent.reshape(-1, 3, 3), 1, 0)

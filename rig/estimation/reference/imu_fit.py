@@ -60,7 +60,7 @@ class Fit:
 def covariance_bound(
     theta: Array, movement: Movement, attitude_std_rad: float, *, second_order: bool = False
 ) -> tuple[Array, Array]:
-    """Return the Cramér–Rao bound (22, 22) of the parameters, and their derivative (22, 3 K) by the readings.
+    """Return the Cramér–Rao bound (22, 22) of the parameters, and their derivatives (22, 3 K) with respect to readings.
 
     `theta` (22,) and `attitude_std_rad` are the true values. Both results depend on movement and noise, not on the
     readings.

@@ -89,7 +89,7 @@ class FieldDrift:
 
     @property
     def steady(self) -> bool:
-        """True if noise explains the change."""
+        """True if noise explains the change of the readings."""
         return self.chi_square <= self.limit
 
 

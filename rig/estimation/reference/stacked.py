@@ -77,9 +77,10 @@ def to_theta(beta: Array) -> Array:
 def estimate_as_published(
     readings: Array, attitudes: Array, prior: ReferencePrior, *, second_order: bool
 ) -> tuple[Array, int]:
-    """Return the parameters (…, 15 or 18) by the paper's method as published, and the number of linear solutions.
+    """Return the parameters by the paper's method as published, and the number of linear solutions.
 
-    With second-order terms the linear solution is repeated until it converges, with s² computed from the last v_ref.
+    There are 15 parameters, or 18 with `second_order` terms. With these terms the linear solution is repeated until the
+    reference converges, each time with squares of the input that are computed from the last solution.
     """
     x = stack(readings, attitudes, None)
     theta = to_theta(_solve(x, column_sizes(readings, None), prior))

@@ -254,7 +254,7 @@ def _list_vibration(uneven: _Unevenness, angle_rad: Array, mean_speed_rad_s: flo
 
 
 def _differentiate(coefficients: Array) -> Array:
-    """Return the derivative (1 + 2 k,) of a Fourier series."""
+    """Return the coefficients (1 + 2 k,) of a Fourier series' derivative: constant, cosine, sine, cosine, …"""
     cos, sin = coefficients[1::2], coefficients[2::2]
     times = np.arange(1, len(cos) + 1)
     return np.concatenate([[0.0], np.stack([times * sin, -times * cos], axis=-1).ravel()])

@@ -60,7 +60,7 @@ class Steps:
         return np.where(wide, 2 * self.units, self.units)
 
     def reads_zero(self, axis: int, readings: Array) -> NDArray[np.bool_]:
-        """Return a mask (n,) of the readings (n,) of an axis that are zero; all if the value of zero is unknown."""
+        """Return a mask (n,) of the readings of an `axis` that were truncated to zero; if `zero` is unknown, of all."""
         zero = float(np.broadcast_to(self.zero, len(self.units))[axis])
         if not np.isfinite(zero):
             return np.ones(len(readings), dtype=np.bool_)
@@ -139,7 +139,7 @@ def _find_unit(axis: Array) -> float:
 
 
 def _count_fractions(axis: Array, unit: float) -> Array:
-    """Return the fraction of readings (n,) at each distinct value."""
+    """Return the fraction of an axis' readings (n,) at each value; differences far below a `unit` do not count."""
     values, often = np.unique(np.rint(axis / (SAME_VALUE_STEPS * unit)), return_counts=True)
     first = np.flatnonzero(np.diff(values, prepend=-np.inf) > 2)  # a record's rounding changes no value by more
     fractions: Array = np.add.reduceat(often, first) / len(axis)

@@ -248,7 +248,7 @@ class MixedModel:
         return projected, projected @ self.mixed.observed
 
     def _log_prior(self, logarithms: Array) -> float:
-        """Return the log-density of `logarithms`, up to a constant: half-Cauchy priors, and likelihood of `alone`."""
+        """Return the log-density of `logarithms` (k,), up to a constant: half-Cauchy priors × likelihood of `alone`."""
         relative = logarithms - np.log(self.mixed.scales)
         squares, dof = self.mixed.alone.T
         measured = dof * logarithms + squares / 2 * np.exp(-2 * logarithms)
@@ -315,7 +315,7 @@ def sample_adaptively(log_density: Callable[[Array], float], begins: Sequence[tu
 
 
 def _adapt(points: Array, logs: Array, proposals: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
-    """Return the mean (k,) and a root (k, k) of the covariance of samples (s, k), weighted as by `_find_weights`."""
+    """Return the mean (k,) and a root (k, k) of the covariance of `points` (s, k), with weights by `_find_weights`."""
     tempered = _temper(_find_weights(points, logs, proposals), 2 * points.shape[1])
     mean = tempered @ points
     deviations = points - mean

@@ -83,7 +83,7 @@ class ParameterFits:
         self.count = 3 * (len(readings.means) - poses.shape[1])
 
     def refer(self, readings: RepeatedMeans, fit: "TemperatureFit") -> None:
-        """Recompute the inputs from the readings corrected to the reference by `fit`, instead of uncorrected ones."""
+        """Recompute the inputs from readings that `fit` has corrected to the reference temperature."""
         powers = self.powers[:, 1:] * self.span ** np.arange(1.0, MAX_ORDER + 1)
         self._fit_inputs(
             readings, readings.means - powers @ fit.bias + (1 - 1 / (1 + powers @ fit.relative)) * self.inputs
@@ -122,7 +122,7 @@ class ParameterFits:
         )
 
     def solve(self, orders: tuple[int, int]) -> TemperatureFit:
-        """Return the fit of temperature polynomials of the given orders for k and c."""
+        """Return the fit of temperature polynomials of these `orders`: for the scale k, and for the bias c."""
         of_scale, of_bias = orders
         loops = 2 if self.has_both_directions else 0
         per_axis = of_scale + of_bias + loops

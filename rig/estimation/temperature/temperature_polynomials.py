@@ -86,7 +86,7 @@ class OverTemperature:
         return moved
 
     def changes(self, temperature_c: Array) -> tuple[Array, Array]:
-        """Return k divided by its value at the reference temperature, and c minus the value there, (N, 3) each."""
+        """Return two arrays (N, 3): scale over that at the reference temperature, and bias minus that there."""
         rows = np.vander(temperature_c - self.reference_c, MAX_ORDER + 1, increasing=True)
         return rows @ (self.scale / self.scale[0]), rows[:, 1:] @ self.bias[1:]
 
@@ -111,7 +111,7 @@ def powers_at(difference_k: float) -> Array:
 def combine_with_reference(
     polynomials: OverTemperature, values: Array, lines: tuple[TemperatureLine, ...]
 ) -> OverTemperature:
-    """Return the polynomials with k and c (6,) at the reference temperature replaced by `values`.
+    """Return the polynomials with the scale k and bias c (6,) at the reference temperature replaced by `values`.
 
     `values` come from another solution, of readings corrected to that temperature. `lines` are the contributors to its
     uncertainty, each with a covariance (6, 6), without the error of the correction.

@@ -199,7 +199,7 @@ class RecomputeOutcome:
 def match_answers(
     stated: Iterable[StatedResult], answers: Mapping[str, Answer], of_u: float = U_FRACTION
 ) -> RecomputeOutcome:
-    """Return each result with the answer under the result's checksum, if any."""
+    """Return each result with the answer under the result's checksum, if any; `of_u` is as in `ComparedResult`."""
     return RecomputeOutcome(
         of_u, tuple(ComparedResult(result, answers.get(result.content_sha256), of_u) for result in stated)
     )

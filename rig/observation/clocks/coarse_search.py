@@ -126,7 +126,7 @@ def _coarse_offset(time_s: Array, readings: Array, arm: _ArmRates) -> _Match:
 
 
 def _fast_length(least: int) -> int:
-    """Return the next number without prime factors above 5: a length for which a Fourier transform is fast."""
+    """Return the first number from `least` on without prime factors above 5: a fast length for a Fourier transform."""
     threes = (3**power for power in range(least.bit_length()))
     odd = (three * 5**power for three in threes for power in range(least.bit_length()) if three * 5**power < 2 * least)
     length: int = min(number << (-(-least // number) - 1).bit_length() for number in odd)

@@ -47,7 +47,7 @@ class OmittedIncrements:
 
 @dataclass(frozen=True, slots=True)
 class GatheredFixes:
-    """Fixes, gathered over windows of `window_s`, and the omitted increments."""
+    """Fixes, that is, attitudes averaged over windows of `window_s`, and the omitted increments between fixes."""
 
     fixes: Fixes
     window_s: float
@@ -60,7 +60,7 @@ class GatheredFixes:
 
 
 def gather(turning: Turning, window_s: float | None = None, clock_s: float = 0.0) -> GatheredFixes:
-    """Return the fixes of a reference's rows, in windows of a given or a suitable length.
+    """Return the fixes of a reference: its rows' attitudes, averaged over windows of a given or a suitable length.
 
     Time t of the reference is time t + `clock_s` of the readings. Only increments in which the body moves are counted:
     raise a Fault if too few of these remain, or fewer than were left out. The Fault's name is the most frequent reason
@@ -131,7 +131,7 @@ def _measure_walk(turning: Turning, rests_s: Array) -> tuple[float, float]:
 
 
 def _drop_thin(fixes: Fixes) -> Fixes:
-    """Return the fixes, except for fixes in motion made of far fewer rows than usual."""
+    """Return the fixes (averaged attitudes) without those in motion that consist of far fewer rows than usual."""
     counts = np.bincount(fixes.fix)
     moving = fixes.placement >= 0
     kept = ~moving | (counts >= MIN_ROW_RATIO * np.median(counts[moving] if moving.any() else counts))

@@ -86,10 +86,10 @@ def check_one_clock(turning: Turning, rates_rad_s: Array | None) -> None:
 
 
 def check_offset(turning: Turning) -> None:
-    """Raise Fault `clocks_apart` if the rotation of rows and readings agrees after another offset of the clocks.
+    """Raise Fault `clocks_apart` if rows and readings show the same rotation only after a shift in time.
 
-    If the first and the last quarter of the readings agree after different offsets, a clock was set in between. One
-    step back in the order of the rows shows this too.
+    If the first and the last quarter of the readings need different shifts to agree with the rows, a clock was set in
+    between. A single step back in the times of the rows shows this too.
     """
     middles_s = turning.rows_s.mean(axis=1)
     backward = np.flatnonzero(np.diff(middles_s) < 0)

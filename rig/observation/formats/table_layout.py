@@ -164,9 +164,10 @@ def _join_headings(groups: Sequence[str], names: Sequence[str]) -> list[str]:
 
 
 def _find_table_rows(columns: Mapping[str, Array]) -> int:
-    """Return the number of rows of the table in a `.mat` file: the length of the columns that name most sensors.
+    """Return the number of rows of the table in a `.mat` file: the length of the columns that mention most sensors.
 
-    If several lengths name equally many, the most common one is taken. Short columns are parameters.
+    Sensors are mentioned in the columns' names. If columns of several lengths mention equally many, the most common
+    length is taken. Short columns are parameters.
     """
     lengths = Counter(map(len, columns.values()))
     longest = max(lengths)

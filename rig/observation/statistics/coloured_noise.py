@@ -85,7 +85,7 @@ def _autoregression(products: Array, count: int, memory: int) -> tuple[float, fl
 
 
 def _products(residuals: Array, memory: int) -> Array:
-    """Return sums (memory + 1, memory + 1) of products among residuals (n,) and their predecessors, oldest first."""
+    """Return sums (memory + 1, memory + 1) of products of residuals (n,) up to `memory` steps apart, oldest first."""
     lagged = np.array([residuals[lag : len(residuals) - memory + lag] for lag in range(memory + 1)])
     products: Array = lagged @ lagged.T
     return products
@@ -109,7 +109,7 @@ def innovations(residuals: Array, memory: int) -> Array:
 
 
 def _correlations(residuals: Array) -> Array | None:
-    """Return the lag correlations (LAGS,); None if the residuals are white or too few."""
+    """Return the correlations (LAGS,) of residuals 1, 2, … steps apart; None if these are white or too few."""
     count = len(residuals)
     centred = residuals - residuals.mean()
     power = float(centred @ centred)

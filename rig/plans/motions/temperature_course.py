@@ -61,7 +61,7 @@ class TemperatureCourse:
         return min(moved) >= NEXT_SET_FRACTION * self.max_step_k
 
     def next_c(self, now_c: float) -> float:
-        """Return the temperature at which the next set is due, for a sensor at `now_c`."""
+        """Return the temperature at which the next set of sweeps is due, for a sensor at `now_c`."""
         if not self.sets:
             return now_c
         last = self.sets[-1].temperatures_c.values()

@@ -65,7 +65,7 @@ def ardupilot_parameters(polynomials: Polynomials, numbers: Mapping[str, int]) -
 
 
 def _about_35(quantity: str, entry: OverTemperatureEntry) -> tuple[tuple[float, ...], ...]:
-    """Return the coefficients of each power 1 to 3, axis by axis, about ArduPilot's 35 °C and in ArduPilot's unit."""
+    """Return a tuple for each power 1 to 3 of T − 35 °C, with the coefficients of x, y, z in ArduPilot's unit."""
     shift_k = ARDUPILOT_REFERENCE_C - entry.reference_c
     orders = [offset_of(quantity, entry, order) for order in range(4)]
     return tuple(

@@ -124,7 +124,7 @@ class Term:
 def terms(
     characteristics: Iterable[Characteristic], finding: Finding[Any], outlet: Outlet | None = None
 ) -> Iterator[Term]:
-    """Yield the characteristics that an entry states; if an output is given as `outlet`, only those that it shows."""
+    """Yield the characteristics that an entry states; if an `outlet` (an output) is given, only those that it shows."""
     for characteristic in characteristics:
         if outlet not in characteristic.exempt and characteristic.read(finding.entry) is not None:
             yield characteristic.term_of(finding)

@@ -26,7 +26,7 @@ OWN_TEMPLATES = Path(__file__).parents[1] / "certificate" / "templates"
 
 @dataclass(frozen=True, slots=True)
 class NoOutlet:
-    """The reason `why` a kind of result does not have an outlet."""
+    """The reason `why` a kind of result does not appear in one of the outputs."""
 
     why: str
 

@@ -214,7 +214,7 @@ def _joint(
 
 
 def _ellipsoid_factor(counted: Sequence[Freedom]) -> float:
-    """Return the factor of the joint ellipsoid of values with `counted` degrees of freedom (None: infinite)."""
+    """Return the factor of the joint coverage ellipsoid of values with these degrees of freedom (None: infinite)."""
     return find_ellipsoid_factor(len(counted), [math.inf if dof is None else dof for dof in counted])
 
 

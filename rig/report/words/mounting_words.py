@@ -19,7 +19,7 @@ def mount_lines(result: ResultDocument) -> Iterator[str]:
 
 
 def farthest_off(result: ResultDocument) -> Iterator[str]:
-    """Yield the line of the stage with the largest mounting error, which also counts the other stages."""
+    """Yield a line of text on the stage with the largest mounting error, and on the number of other stages."""
     mounts = _significant_mounts(result)
     if not mounts:
         return

@@ -105,7 +105,10 @@ class FollowedSession:
         self.tell(HandRested(report.after_us, report.end_us, self._lay[-1]))
 
     def _ask(self, wrong: Fault | None) -> None:
-        """Request the next flip of `FACE_ORDER`, which is repeated until the board has enough moves."""
+        """Request the next flip; the order `FACE_ORDER` begins anew until the board has enough moves.
+
+        `wrong`: the error of a refused last move, else None.
+        """
         flips = self.moves
         while (remaining := still_open(WantedMoves(flips, 0), self._accepted, self._lay)).done:
             flips += len(FACE_ORDER)

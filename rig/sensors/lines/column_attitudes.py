@@ -88,7 +88,7 @@ def find_quaternion(layout: TableLayout, values: Array, matrices: Sequence[int])
 
 
 def _says_otherwise(layout: TableLayout, index: int) -> bool:
-    """Return whether a heading names an element of a matrix or another quantity, or states a unit."""
+    """Return whether a heading excludes a quaternion: it names a matrix element or another quantity, or has a unit."""
     name = _plain(re.sub(r"\[x.*?\]", "", layout.headings[index]))
     has_unit = layout.units[index] in UNITS and layout.units[index] != "1"
     return has_unit or MATRIX_NAME.fullmatch(name) is not None or OTHER_WORD.search(name) is not None

@@ -228,7 +228,7 @@ def _kind(values: Array, still: Flags) -> str | None:
 
 
 def _gravity(level: float) -> tuple[str, float] | None:
-    """Return the unit and scale in which the norm `level` equals gravity; None if there are none."""
+    """Return a unit, and a factor on the numbers, for which the norm `level` at rest is gravity; None if none fits."""
     for size, unit in ((G, "m/s2"), (1.0, "g"), (1000.0, "mg")):
         if abs(level / size - 1) < TOLERANCE / 2:
             return unit, 1.0

@@ -95,8 +95,8 @@ class AutopilotLink:
     def parameters(self, needed: Iterable[str], others: Iterable[str] = ()) -> Mapping[str, AutopilotParameter]:
         """Return the parameters, `needed` and `others`, that the autopilot sends on request.
 
-        Only for a needed one requests are repeated until the time-out. Raise SensorError `autopilot_silent` if none
-        comes.
+        Requests are repeated a few times, and until the time-out while a needed parameter is missing. Raise SensorError
+        `autopilot_silent` if no parameter comes.
         """
         needed = set(needed)
         names = needed | set(others)

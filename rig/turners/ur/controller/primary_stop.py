@@ -70,7 +70,7 @@ class PrimaryStop:
         self._socket.close()
 
     def _decode_states(self) -> Iterator[bool]:
-        """Yield whether a program runs or is paused, for each received state, oldest first."""
+        """Yield for each received state, oldest first, whether there is a program, either running or paused."""
         for kind, payload in packages(self._buffer):
             if kind == ROBOT_MESSAGE:
                 match decode_message(payload):

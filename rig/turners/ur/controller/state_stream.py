@@ -232,7 +232,7 @@ class StateStream:
 
 
 def _decode_packet(payload: bytes) -> StatePacket:
-    """Return a packet's content. Raise `ConnectionError` for a wrong number of bytes, of which some were lost."""
+    """Return a packet's content. Raise `ConnectionError` for a wrong number of bytes, because some were lost."""
     if len(payload) != PACKET.size:
         raise ConnectionError(f"a state of {len(payload)} bytes instead of {PACKET.size}")
     values = PACKET.unpack(payload)

@@ -32,7 +32,7 @@ def _twist(q: Sequence[float] | Array, rotation: Array, position: Array, links: 
 
 
 def _length(twist: Array) -> float:
-    """Return the length of a displacement (6,), m; a rotation counts by an arc of radius `ROTATION_RADIUS_M`."""
+    """Return the length of a displacement (6,), m; a rotation counts as its arc at the radius `ROTATION_RADIUS_M`."""
     return max(hypot(*twist[:3]), ROTATION_RADIUS_M * hypot(*twist[3:]))
 
 

@@ -13,7 +13,7 @@ from rig.world.ur10e.robot import Robot
 
 
 def build_questions(robot: Robot, registers: ProgramRegisters) -> dict[int, Callable[[], None]]:
-    """Return a function for each command that takes no time, by number; a `ProgramError` of it ends the program."""
+    """Return a function for each command that takes no time, by number; a `ProgramError` ends the program."""
 
     def put(values: Sequence[float]) -> None:
         registers.write_doubles(values)
