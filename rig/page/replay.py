@@ -167,7 +167,7 @@ def _state(row: Any) -> State:
 
 
 class _ReplayedSamples:
-    """One sensor's samples up to a time."""
+    """One sensor's recorded samples; `until` summarises those up to a time."""
 
     def __init__(self, run: RunData, name: str) -> None:
         self._name, self._samples = name, run.samples[name]

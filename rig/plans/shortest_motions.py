@@ -40,7 +40,7 @@ def vary_arm(config: RigConfig) -> Iterator[Motion]:
 
 
 def vary_attitudes(config: RigConfig) -> Iterator[Motion]:
-    """Yield the file's attitudes and the named sets of attitudes; with magnetometers only the file's."""
+    """Yield the file's attitudes and, unless there are magnetometers, the named sets of attitudes."""
     procedure = config.procedure
     assert isinstance(procedure, AttitudesSection)
     sets = [procedure.attitudes, *(() if config.magnetometers else ATTITUDE_SETS.values())]

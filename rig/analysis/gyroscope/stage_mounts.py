@@ -56,7 +56,7 @@ def observe_as_mounted(
 
 
 def _estimate_mounts(recordings: Sequence[ObservedRun], settings: RunSettings) -> tuple[EstimatedMount, ...]:
-    """Return the mounts of all stages except the first, from the sensor that shows them best; empty without one."""
+    """Return the mounts of all stages except the first, from the sensor that shows mounts best; empty if none does."""
     stages = list(dict.fromkeys(recording.run.settings.stage for recording in recordings))
     if len(stages) < 2:
         return ()

@@ -300,7 +300,7 @@ def _bias_walk(graph: Graph, row: int) -> Factor:
 
 
 def _rest(graph: Graph, row: int) -> Factor:
-    """Return the factor of a rest, in which the gyroscope reads its bias plus its sensitivity times the vertical."""
+    """Return the factor of a rest, in which a gyroscope reads its bias plus its g-sensitivity times the vertical."""
     session, state = graph.session, graph.state
     rest, up = session.rests[row], state.attitudes[row][2]
     design = np.zeros((3, graph.width))

@@ -46,7 +46,8 @@ def vector_matrix_bound(rates_rad_s: ArrayLike, variances_rad2_s2: ArrayLike) ->
 def vector_bound(matrix: ArrayLike, rates_rad_s: ArrayLike, variances_rad2_s2: ArrayLike) -> Array:
     """Return the Cramér–Rao bound (6, 6) for kx, ky, kz, bx, by, bz if the rates are known as vectors.
 
-    `matrix` (3, 3) is the true F.
+    `matrix` (3, 3) is the gyroscope's true matrix F. The mean readings of N sweeps have the true rates `rates_rad_s`
+    (N, 3) and the variances `variances_rad2_s2` (N, 3).
     """
     f = np.asarray(matrix, dtype=np.float64)
     jacobian = parameter_jacobian(f, scale_of(f))

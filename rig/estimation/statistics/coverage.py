@@ -48,7 +48,7 @@ def tail_probability(distances: ArrayLike, dof: ArrayLike) -> Array:
 
 
 def false_alarm_of_each(of_all: float, tests: int) -> float:
-    """Return the false-alarm probability of each of `tests` tests for the probability `of_all` that any fails.
+    """Return the false-alarm probability of each of `tests` tests, if that of all tests together is to be `of_all`.
 
     Bonferroni's inequality also holds for dependent tests.
     """

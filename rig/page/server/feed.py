@@ -119,7 +119,7 @@ class Mailbox:
 
 
 class Broadcast:
-    """The server's side, all in its event loop."""
+    """The distribution of frames to the browsers' mailboxes, which runs only in the server's event loop."""
 
     def __init__(self, feed: Source) -> None:
         self._feed = feed

@@ -67,7 +67,7 @@ def speed_words(sensor: GyroscopeEntry) -> str:
 
 
 def load_words(sensor: GyroscopeEntry) -> str | None:
-    """Return the rates about a gyroscope's own axes, °/s; None if they equal the rates of the sweeps."""
+    """Return the rates about a gyroscope's own axes, °/s, in words; None if they equal the rates of the sweeps."""
     loads, speeds = sensor.axis_rate_ranges_rad_s, sensor.speeds_rad_s
     if loads is None or not speeds:
         return None

@@ -50,7 +50,7 @@ class ArmDescription:
 
     @property
     def complete(self) -> bool:
-        """Whether all expected items have come; the software comes before all others, if at all."""
+        """Whether all expected items have come. The version of the software, if sent at all, comes before these."""
         return None not in (self.kinematics, self.tcp_offset, self.setup)
 
 
