@@ -38,7 +38,7 @@ class MagnetometerReversal:
 
 
 def reversals(runs: Sequence[tuple[str, Outcome]]) -> dict[str, MagnetometerReversal]:
-    """Return bias and field, separated by at least two named runs, of every magnetometer of the first run.
+    """Return for each magnetometer of the first run its bias and the arm's field, separated by two or more named runs.
 
     Raise Refused `too_few_runs`, `no_magnetometer` if a run did not record or calibrate a magnetometer of the first
     run, `runs_do_not_match` with the difference, and what `separate` raises.

@@ -51,7 +51,7 @@ class _LimitSet:
         return Check(name_check(self.sensor, self.quantity, what), value, limit, row.unit, means)
 
     def nearest(self, what: str, values: Array, uncertainty: ExpandedUncertainty | None) -> Check:
-        """Return the check of the axis that exceeds its limit most, by the decision rule, or else is nearest to it."""
+        """Return the check of the axis that, by the decision rule, exceeds the limit most or comes nearest to it."""
         check = self.check(what, _largest_magnitude(values))
         if uncertainty is None or check.value is None:
             return check
@@ -96,8 +96,8 @@ def judge(
 ) -> tuple[Check, ...]:
     """Return the checks of every gyroscope by name.
 
-    With a budget, combined uncertainties are judged, and values by the decision rule. Without a budget, only the
-    uncertainty due to noise is judged.
+    With a budget, its combined uncertainties are judged, and the decision `rule` applies to values. Without a budget,
+    only the uncertainty due to noise is judged.
     """
     checks: list[Check] = []
     for name, solution in solutions.items():

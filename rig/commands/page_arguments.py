@@ -126,7 +126,7 @@ def read_page_wish(options: argparse.Namespace) -> PageWish | None:
 def serve_operators_page(
     wanted: PageWish | None, folder: Path, about: "Callable[[], About]"
 ) -> Iterator[OperatorsPage]:
-    """Yield a run's page, served during the block; if none is `wanted`, a page without effect. Raise `page_address`."""
+    """Yield a run's page, served during the block; if none is `wanted`, one without effect. Raise `page_address`."""
     if wanted is None:
         yield OperatorsPage()
         return

@@ -96,7 +96,7 @@ def equal_runs(values: NDArray[Any]) -> NDArray[np.intp]:
 
 
 def runs_between(changes: NDArray[np.bool_], count: int) -> NDArray[np.intp]:
-    """Return the first index and the end (k, 2) of each run of `count` values.
+    """Return the first index and the end (k, 2) of each of the k runs that divide a series of `count` values.
 
     `changes` (count − 1,) is true at i if a new run begins at value i + 1; the ends are exclusive.
     """

@@ -51,7 +51,7 @@ class SensorAxes:
         return matrix
 
     def angles_covariance_rad2(self, of_matrix: Array) -> Array:
-        """Return the covariance (6, 6) of non-orthogonality and mounting, from that (9, 9) of the matrix, by rows."""
+        """Return the covariance (6, 6) of non-orthogonality and mounting, from `of_matrix` (9, 9), that of F."""
         to_angles = self.to_angles
         covariance: Array = to_angles @ of_matrix @ to_angles.T
         return covariance

@@ -124,7 +124,7 @@ class WhitenedReference:
         return maximise_likelihood(self.growth, self.residuals, model)[0]
 
     def _whiten_residuals(self, model: Array, delta_rad: float) -> tuple[Array, Array]:
-        """Return the model's basis and residuals, whitened with the attitude error `delta_rad`."""
+        """Return the model's basis and residuals, both whitened for attitude errors of std `delta_rad`."""
         size = np.sqrt(1 + delta_rad**2 * self.growth)
         model_basis, residuals = orthonormal_basis(model / size[:, None]), self.residuals / size
         return model_basis, residuals - model_basis @ (model_basis.T @ residuals)

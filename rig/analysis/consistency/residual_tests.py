@@ -62,9 +62,9 @@ class WhitenedModel(Protocol):
     def test(
         self, columns: Array | None, nuisance: Sequence[Array], false_alarm_probability: float
     ) -> Statistic | None:
-        """Return the χ² that columns explain, and its critical value for this false-alarm probability.
+        """Return the χ² that `columns` explain, and its critical value for this false-alarm probability.
 
-        Return None if model and nuisance columns span the columns.
+        Return None if the model and the `nuisance` columns already explain all that `columns` can.
         """
 
 

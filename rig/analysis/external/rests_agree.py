@@ -53,7 +53,7 @@ def check_rests_agree(turning: Turning, solution: IncrementSolution) -> None:
 
 
 def _check_steady(half_range_rad_s: Array) -> None:
-    """Raise Fault `bias_jumped` if half the range (3,) of the readings at rest exceeds a plausible bias drift."""
+    """Raise Fault `bias_jumped` if half the range (3,) of the mean readings at rest exceeds a plausible bias drift."""
     axis = int(np.argmax(half_range_rad_s))
     if half_range_rad_s[axis] > MAX_HALF_RANGE_RAD_S:
         raise Fault(

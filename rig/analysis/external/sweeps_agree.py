@@ -193,7 +193,7 @@ def _additional_std(noise_std: Array, expanded: Array, known_dof: float, dof: fl
 
 
 def _equations(data: ExternalData) -> tuple[Array, Array, Array]:
-    """Return mean readings (N, 3) of sweeps, then rests, their variances (N, 3), and the design (N, 4), [ω 1]."""
+    """Return the means (N, 3), first of sweeps, then of rests, their variances (N, 3), and the design [ω 1] (N, 4)."""
     averages, rates_rad_s = stack_rows(data.sweeps, data.rests)
     return (
         np.array([average.mean_rad_s for average in averages]),

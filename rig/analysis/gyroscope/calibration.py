@@ -231,7 +231,7 @@ def _choose_correction(solution: Estimate, *, whole_matrix: bool) -> Correction:
 def solve_observations(
     observations: Sequence[Observation], estimator: Estimator, rests: Sequence[Average] = ()
 ) -> Estimate:
-    """Return scale and bias by any of the estimators; only the vector model uses rests."""
+    """Return scale and bias by the given `estimator`; only the vector model uses `rests`."""
     if estimator == "vector":
         return solve_vector(observations, rests)
     if estimator == "levenberg_marquardt":

@@ -66,7 +66,7 @@ class Datasheet:
 
     @property
     def odd_s4_m2(self) -> float:
-        """The half-width of the cubic term χ if it alone is nonlinear.
+        """The half-width of the cubic term χ if no other term is nonlinear.
 
         Up to the force V = `over_g`, χ v³ deviates from its best line by χ V³/4.
         """

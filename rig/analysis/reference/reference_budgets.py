@@ -43,7 +43,7 @@ def accelerometer_budget(
     noise_dof: Array,
     datasheet: Datasheet | None = None,
 ) -> Budget:
-    """Return the budget of the solution of the `movement`.
+    """Return the budget of an accelerometer's `solution` from a `movement`.
 
     `lag_s` is the half-width of the sensor's filter lag. `noise_dof` (3 N + 9 M,) are the degrees of freedom of the
     variances of the dwells' readings, then of the sweeps' harmonics. With a `datasheet` the sensor's own errors are

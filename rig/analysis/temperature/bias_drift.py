@@ -181,7 +181,7 @@ def fit_acceleration_drift(repeats: Sequence[Sequence[DwellMean]], site: Site, *
 
 
 def fit_rate_drift(repeats: Sequence[Sequence[DwellMean]], site: Site) -> BiasDrift:
-    """Return the drift of a gyroscope with nominal scale and axes. Raise Fault as `bias_by_repeat` does."""
+    """Return a gyroscope's bias drift, computed with nominal scale and axes. Raise Fault as `bias_by_repeat` does."""
     means, variances, attitudes = _stack(repeats)
     earth = np.zeros(3) if site.earth_rate_rad_s is None else np.array(site.earth_rate_rad_s)
 

@@ -108,7 +108,7 @@ def _test_hypotheses(fit: GraphFit, since: int | None) -> list[FaultHypothesis]:
 
 
 def _drop_with_new_stds(fit: GraphFit, name: str, index: int) -> float:
-    """Return the decrease of χ² with standard deviations re-estimated without the fault; 0 if they hardly change."""
+    """Return the decrease of χ² if the fault is fitted and the stds are re-estimated; 0 if these hardly change."""
     columns = _fault_columns(fit, name, index)
     ends = np.cumsum([len(row.residual) for row in fit.factors])[:-1]
     parts = zip(fit.factors, np.split(columns, ends), strict=True)
@@ -128,7 +128,7 @@ def _matches(row: Factor, index: int, *kinds: str) -> bool:
 
 
 def _fault_columns(fit: GraphFit, name: str, index: int) -> Array:
-    """Return the columns (R, q) that a fault adds to the design of all R equations."""
+    """Return the columns (R, q) that the fault `name` at the rest or move `index` adds to the design of R equations."""
     if name == "table_moved":
         return np.concatenate([_tilt_columns(fit, row, index) for row in fit.factors])
     if name == "accelerometer_jumped":
@@ -217,7 +217,7 @@ def _describe_jump(index: int, rests: Sequence[HandRest]) -> Fault:
 
 
 def _find_excessive_std(fit: GraphFit) -> Fault | None:
-    """Return the fault of an impossibly large standard deviation of hand or sensor, or None."""
+    """Return the Fault for an impossibly large standard deviation of hand or sensor; None if there is none."""
     stds = fit.stds
     if stds.repeat_rad >= AT_LIMIT_RATIO * MAX_STDS.repeat_rad:
         what = f"the faces were not laid down as before: they differ by {1e3 * stds.repeat_rad:.1f} mrad or more"

@@ -51,7 +51,7 @@ def _find_curvatures(explained: VectorFit, turns_rad: Array) -> Array:
 
 
 def _find_regression(explained: VectorFit) -> Array:
-    """Return the linear map (3, 4, N) from mean readings to each axis' row of the matrix and offset, mounts fixed."""
+    """Return the linear map (3, 4, N) from mean readings to each axis' row of matrix and offset if mounts are exact."""
     inputs, solution, bias = explained.inputs, explained.solution, explained.bias
     design = design_matrix(inputs.rates_rad_s, None if solution.g_sensitivity is None else inputs.apparent_gravity_m_s2)
     of_speed = propagate_speed_std(inputs.rates_rad_s, inputs.speed_std_rad_s, solution.matrix)

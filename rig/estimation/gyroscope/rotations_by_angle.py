@@ -187,7 +187,7 @@ def solve_turned(
 def _equate(
     gyroscope: Gyroscope, turns: Sequence[Turn], means: Sequence[RateMean], state: _TurnsEstimate
 ) -> list[_ObservationEquations]:
-    """Return the equations of the means, then of the rotations as mean rates."""
+    """Return the equations of the `means`, then those of the `turns`, whose rotations are expressed as mean rates."""
     windows_s = np.array([(turn.start_s, turn.end_s) for turn in turns])
     turned = increments(gyroscope.time_s, gyroscope.readings, state.matrix, state.offset, windows_s)
     return [

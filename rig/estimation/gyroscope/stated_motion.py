@@ -54,7 +54,7 @@ class StatedMotion:
 
     @property
     def relative_noise(self) -> float:
-        """The median over all sweeps of the noise of a sweep's mean as a fraction of its rate."""
+        """The noise of a sweep's mean as a fraction of the sweep's rate, median over all sweeps."""
         sizes = np.linalg.norm(self.rate_patterns, axis=1)
         swept = sizes > 0
         noise = np.sqrt(self.variances_rad2_s2.mean(axis=1))
@@ -113,7 +113,7 @@ def motion_errors(motion: StatedMotion) -> MotionErrors:
 
 
 def _likelihoods(motion: StatedMotion, axis_rad: float, rates: Array) -> Array:
-    """Return the restricted log-likelihoods (k,) of the stds `rates` (k,) of rate errors, for the axis' std `axis_rad`.
+    """Return restricted log-likelihoods (k,) if rate errors have stds `rates` (k,), and axis errors the std `axis_rad`.
 
     A rate error changes the covariance of a sweep by one dyad, so each inverse has a rank-one update (Sherman and
     Morrison, Ann. Math. Stat. 21 (1950) 124).

@@ -22,7 +22,7 @@ class MovementMasks:
 
 
 def mask_movement(run: RunData, time_s: Array) -> MovementMasks:
-    """Return masks of the samples at controller times (n,) by what the arm was doing; the recording holds a sweep."""
+    """Return masks of samples at controller times (n,) for what the arm did; the recording must contain a sweep."""
     sweeps, rests = [finished.window for finished in swept(run)], list(iterate_rests(run))
     return MovementMasks(
         moving=_mask_windows(time_s, Window(sweeps[0].start_s, max(window.end_s for window in [*sweeps, *rests]))),

@@ -230,7 +230,10 @@ def _explain_by_step(residuals: Array) -> float:
 
 
 def _segment_rest(stream: Stream, motion: ArmMotion, average: Average, count: int, response: Array) -> SegmentedAverage:
-    """Return a rest with the averages of its segments, without vibrations and without the arm's oscillation."""
+    """Return a rest with the averages of its `count` segments, without vibrations and the arm's oscillation.
+
+    The oscillation is computed from the flange's rates by the sensor's `response` (3, 3) to them.
+    """
     inside = slice_time(stream, average.start_s, average.end_s)
     division = _divide(stream, average, np.ones(inside.stop - inside.start, dtype=np.bool_), count)
     readings = division.readings_rad_s - motion.rates_at_samples(division.time_s) @ response.T

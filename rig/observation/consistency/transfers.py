@@ -109,7 +109,7 @@ def find_transfer(motion: ArmMotion, start_s: float, end_s: float) -> MotionInte
 
 
 def _rate_norms(motion: ArmMotion, time_s: Array) -> tuple[Array, Array]:
-    """Return norms (n,), rad/s, of the flange's rate at times (n,), and of its mean over `SMOOTHING_S` around each."""
+    """Return two norms (n,), rad/s, at times (n,): of the flange's rate, and of its mean over `SMOOTHING_S`."""
     half_s = SMOOTHING_S / 2
     within_s = np.clip(time_s, motion.time_s[0] + half_s, motion.time_s[-1] - half_s)
     rates, smoothed = motion.rate(time_s), motion.mean_rates(within_s, SMOOTHING_S)

@@ -25,7 +25,7 @@ MIN_BINS = 16
 
 
 def vibrates(readings: Array) -> bool:
-    """Return whether most of the scatter of readings (n, 3) at rest is a vibration, on any axis."""
+    """Return whether, on any axis, most of the scatter of readings (n, 3) at rest is due to a vibration."""
     return len(readings) > 2 * _count_low_bins(len(readings)) and any(
         fit_noise_factor(axis) < MAX_NOISE_RATIO for axis in readings.T
     )
