@@ -112,7 +112,7 @@ def judge(
 
 
 def verification_checks(sensor: str, verification: "Verification | None", limits: Limits | None) -> tuple[Check, ...]:
-    """Return the checks of calibrated readings: the worst axis, and the worst mean over a revolution.
+    """Return the checks of calibrated readings: the largest RMS error of an axis, the largest mean error of a turn.
 
     The limit of the mean also applies to the reference's own error, which may be the cause. If `verification` is None,
     the checks have no value.

@@ -1,4 +1,4 @@
-"""A session by hand on the page: the instruction, the response, the present movement."""
+"""A session by hand on the page: the instruction, the rig's response to the last move, the present movement."""
 
 from math import degrees
 from typing import Any

@@ -1,7 +1,7 @@
 """The search for the shortest run of a configuration that reaches a target uncertainty. Pure functions.
 
-The order, directions, stages, several speeds and six axes that the file states are kept, and with magnetometers also
-the attitudes.
+The order, directions, stages, several speeds and six axes that the file states are kept; if there are magnetometers,
+the attitudes are kept too.
 """
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -241,7 +241,7 @@ class _TurnerSearch:
         return candidates
 
     def _counts(self, plan: Plan) -> Mapping[str, int]:
-        """Return the number of waits in a plan whose duration a key states, for each key of `waits`."""
+        """Return for each key of `waits` the number of waits in a plan that last as long as the key states."""
         # By their names: a field test is a Rest as well, but its duration has another key.
         rests = sum(step.name.startswith("rest") for step in plan.steps)
         return {key: {"rest_s": rests, "dwell_s": len(plan.dwells)}[key] for key in self.waits}

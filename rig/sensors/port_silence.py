@@ -28,8 +28,8 @@ PATIENCE = Patience()
 class PortSilence:
     """The silence of a port: the time, s, for which it was read without data.
 
-    A delayed reader therefore does not make a device seem silent. Time in which another instrument's clock stops, as in
-    a simulation, does not count either.
+    A delayed reader therefore does not make a device seem silent. Time in which the turner's clock stops, as in a
+    simulation, does not count either.
     """
 
     def __init__(self) -> None:

@@ -79,7 +79,7 @@ class DriftingSensor:
     """A sensor whose bias changes from one repeat to the next.
 
     `matrix` is F (3, 3), `bias` (3,) the first bias, and `bias_steps` the standard deviations of the bias' steps before
-    each repeat; `random_walk` limits an average. All are in the unit of the readings.
+    each repeat, in the unit of the readings. `random_walk`, in this unit times √s, is the white noise of the readings.
     """
 
     matrix: Array

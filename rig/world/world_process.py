@@ -115,7 +115,7 @@ class World:
         return json.dumps(self._description)
 
     def _describe_instruments(self, config: RigConfig, paths: Mapping[str, str]) -> dict[str, dict[str, str]]:
-        """Return the ports of the instruments by name, and the `paths` of their pseudo-terminals, kind by kind."""
+        """Return the instruments' ports by name, and for each kind of instrument the `paths` of pseudo-terminals."""
         mounts = self.laboratory.instruments
         ports = {name: sensor.serial.port for name, sensor in config.sensors.items() if sensor.serial is not None}
         return {

@@ -134,7 +134,7 @@ def _accelerations(recordings: Sequence[ObservedRun], name: str, sensor: Recorde
 
 
 def _rates(recordings: Sequence[ObservedRun], name: str, sensor: RecordedSensor) -> dict[int, DwellMean]:
-    """Return the gyroscope's means in every dwell, by the dwell's index, from the rest within the dwell."""
+    """Return the gyroscope's mean in every dwell, taken over the rest within the dwell, by the dwell's index."""
     mounting = np.array(sensor.mounting)
     means = {}
     for recording in recordings:

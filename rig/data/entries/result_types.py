@@ -14,7 +14,7 @@ Matrix3 = tuple[Vector3, Vector3, Vector3]
 
 
 def covariance(rows: tuple[tuple[float, ...], ...]) -> tuple[tuple[float, ...], ...]:
-    """Return the rows. Raise ValueError if they are not square or hold a negative variance."""
+    """Return the rows unchanged. Raise ValueError if they are not square or hold a negative variance."""
     if any(len(row) != len(rows) for row in rows):
         raise ValueError("must have as many columns as rows")
     if any(row[i] < 0 for i, row in enumerate(rows)):

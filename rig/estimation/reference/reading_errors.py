@@ -137,7 +137,7 @@ def repeat_by_segment(values: Array, movement: Movement) -> Array:
 
 
 def per_axis(columns: Array) -> Array:
-    """Return columns (3 K, 3) from (K, 3): a separate column for each axis."""
+    """Return the effects (3 K, 3) of an error of each axis on all readings, from those on its own axis, `columns`."""
     return np.asarray((columns[:, :, None] * np.eye(3)).reshape(-1, 3), dtype=np.float64)
 
 

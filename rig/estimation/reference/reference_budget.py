@@ -137,7 +137,7 @@ def type_b(name: str, half_width: float, unit: str, source: str, covariance: Arr
 
 
 def _evaluate_norm(scale: Array, size: NormUncertainty) -> Contributor:
-    """Return the contributor of the reference's norm. It changes all scale factors in proportion and no bias."""
+    """Return the contributor of the reference's norm. Its error changes scale factors in proportion, and no bias."""
     derivative = np.concatenate([scale, np.zeros(3)])
     distribution: Literal["normal", "rectangular"] = "normal" if size.stated else "rectangular"
     std = size.relative / (COVERAGE_FACTOR if size.stated else np.sqrt(3))

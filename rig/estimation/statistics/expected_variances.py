@@ -83,7 +83,7 @@ def estimate_variances(fit: ResidualInputs, fractions: Sequence[float]) -> Error
 def estimate_disturbances(
     fit: ResidualInputs, sizes: ErrorSizes, causes: Sequence[Array], odds: Sequence[float]
 ) -> Array:
-    """Return the expected variances (k,) of `causes`: arrays (n, q), the changes of the readings if the variance is 1.
+    """Return the expected variances (k,) of `causes`, each given by its changes (n, q) of the readings at variance 1.
 
     The priors are log-uniform, with `odds` (k,) that the cause exists. At most one cause is assumed to exist at a time.
     """

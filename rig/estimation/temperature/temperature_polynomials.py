@@ -86,7 +86,7 @@ class OverTemperature:
         return moved
 
     def changes(self, temperature_c: Array) -> tuple[Array, Array]:
-        """Return two arrays (N, 3): scale over that at the reference temperature, and bias minus that there."""
+        """Return the scale over its value at the reference temperature, and the bias minus its value there, (N, 3)."""
         rows = np.vander(temperature_c - self.reference_c, MAX_ORDER + 1, increasing=True)
         return rows @ (self.scale / self.scale[0]), rows[:, 1:] @ self.bias[1:]
 

@@ -288,7 +288,7 @@ def _walk_variance(walk: Array, apart: int) -> float:
 
 
 def _merge_at_longest(missing: NDArray[np.intp], steps_s: Array) -> NDArray[np.intp]:
-    """Return the missing readings (n − 1,) with each loss counted once, at the longest of the steps that it affects."""
+    """Return numbers (n − 1,) of missing readings with each loss counted once, at the longest step that it affects."""
     merged = np.zeros_like(missing)
     steps = np.flatnonzero(missing)
     if not len(steps):

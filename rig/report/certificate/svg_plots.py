@@ -34,7 +34,10 @@ class UprightAxis:
 
     @classmethod
     def fit(cls, largest: float, units: Sequence[DisplayUnit]) -> "UprightAxis":
-        """Return an axis with a round reach above `largest`, in the first of `units` in which `largest` exceeds 1."""
+        """Return an axis to a tenth beyond a round number, the next above `largest`, in a suitable one of `units`.
+
+        The unit is the first in which `largest` is at least 1, or else the last.
+        """
         unit = next((unit for unit in units if largest >= unit.size), units[-1])
         shown = largest / unit.size
         decade = 10 ** np.floor(np.log10(max(shown, 1e-9)))

@@ -23,7 +23,7 @@ def joint_factor(budget: BudgetEntry) -> float:
 
 
 def coverage_sentence(budget: BudgetEntry) -> str:
-    """Return the statement on k according to EA-4/02 M:2022, 6.4, or to annex E for few degrees of freedom."""
+    """Return the statement on k that EA-4/02 M:2022 requires: in 6.4, or, for few degrees of freedom, in annex E."""
     begins = (
         "The reported expanded uncertainty of measurement is the standard uncertainty of measurement multiplied by the "
         "coverage factor k"

@@ -107,7 +107,7 @@ class FollowedSession:
     def _ask(self, wrong: Fault | None) -> None:
         """Request the next flip; the order `FACE_ORDER` begins anew until the board has enough moves.
 
-        `wrong`: the error of a refused last move, else None.
+        `wrong`: the error for which the last move was refused, else None.
         """
         flips = self.moves
         while (remaining := still_open(WantedMoves(flips, 0), self._accepted, self._lay)).done:

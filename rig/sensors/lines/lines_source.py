@@ -94,7 +94,7 @@ class LinesSource:
         self._device.close()
 
     def _take(self, values: Array, numbers: NDArray[np.int64], times_us: NDArray[np.int64], host_time_s: float) -> None:
-        """Pass the numbers of the lines on as samples, on the reader's thread."""
+        """Pass on the `values` of lines as samples with these numbers and times, on the reader's thread."""
         for name, (sensor, printed_channels) in self._readers.items():
             readings = [
                 self._thermometer.read(_temperatures_c(self._lines, values))

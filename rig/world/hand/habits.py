@@ -48,7 +48,7 @@ class Mistake:
 
     @property
     def magnitude(self) -> float:
-        """The magnitude, in the unit of its kind."""
+        """The magnitude of the mistake, in the unit of the mistake's kind."""
         return MISTAKE_SIZES.get(self.kind, 0.0) if self.size is None else self.size
 
 
