@@ -22,8 +22,8 @@ RAW, CORRECTED = "six_observation", "verify"  # procedures that judge any record
 class RecordedRun:
     """The recordings of a run, oldest first: `raw` as measured, and `corrected` by the board.
 
-    `path` is the run folder, or the run file of a single recording (`alone`). `script` is the script that the
-    user has named, or None.
+    `path` is the run folder, or the run file of a single recording (`alone`). `script` is the script that
+    the user has named, or None.
     """
 
     path: Path

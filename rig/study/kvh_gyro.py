@@ -68,7 +68,7 @@ def study(settings: Settings) -> StudyReport:
 
 
 def _calibrate(noise_rad_s: float, rng: np.random.Generator, _: int) -> tuple[Array, Array, float]:
-    """Return the parameters θ (15,), their standard deviations, and the std of the worst axis' corrected errors."""
+    """Return the parameters θ (15,), their stds, and the std of the corrected readings' errors on the worst axis."""
     attitudes, rates = rt.simulate_oscillation(DURATION_S)
     truth = rt.project(attitudes, rt.GYRO_REFERENCE_RAD_S) + rates
     readings = truth @ rt.GYRO_MATRIX.T + rt.GYRO_BIAS_RAD_S + noise_rad_s * rng.normal(size=truth.shape)

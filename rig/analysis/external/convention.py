@@ -134,9 +134,9 @@ def _explain(rates: Array, readings: Array) -> tuple[float, Array]:
 
 
 def _find_up(forces: Array) -> tuple[float, str]:
-    """Return the length of the mean of forces (n, 3) over their mean length, and the axis of the room along that mean.
+    """Return the length of the mean force divided by the mean length of forces (n, 3), and the room's axis along it.
 
-    The axis has a sign, as in "+z"; it is "" if the mean is too short or too oblique to show one.
+    The axis has a sign, as in "+z"; it is "" if the mean force is too short or too oblique to show one.
     """
     mean = forces.mean(axis=0)
     mean /= max(float(np.linalg.norm(forces, axis=1).mean()), 1e-9)

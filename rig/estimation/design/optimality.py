@@ -27,7 +27,7 @@ PARAMETER_COUNT: Mapping[Model, int] = {"squared": 6, "vector": 4}
 def prediction_variance(directions: ArrayLike, points: ArrayLike, model: Model = "squared") -> Array:
     """Return the prediction variance (M,) at `points` (M, 3) for sweeps in `directions` (N, 3); inf if singular.
 
-    It is N f(x)ᵀ (XᵀX)⁻¹ f(x) at a point x, with the terms f of the model, and X the terms of all directions as rows.
+    At a point x it is N f(x)ᵀ (XᵀX)⁻¹ f(x), with the model's terms f, which for the directions are the rows of X.
     """
     x, f = _features(directions, model), _features(points, model)
     if np.linalg.matrix_rank(x) < x.shape[1]:

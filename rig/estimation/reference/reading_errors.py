@@ -137,7 +137,7 @@ def repeat_by_segment(values: Array, movement: Movement) -> Array:
 
 
 def per_axis(columns: Array) -> Array:
-    """Return the effects (3 K, 3) of an error of each axis on all readings, from those on its own axis, `columns`."""
+    """Return the effects (3 K, 3) on all readings of an error on each axis; `columns` (K, 3): those on its own axis."""
     return np.asarray((columns[:, :, None] * np.eye(3)).reshape(-1, 3), dtype=np.float64)
 
 

@@ -181,6 +181,6 @@ def clock_unknown() -> Refused:
 
 
 def rotate_face(face: str, rotation: Array) -> Face:
-    """Return a face's name in other axes, given by the nearest; `rotation` (3, 3) converts vectors to those axes."""
+    """Return the name of the face nearest to `face` in other axes, to which `rotation` (3, 3) converts vectors."""
     name = nearest_face(rotation @ axis_of(face))
     return next(candidate for candidate in FACES if candidate == name)

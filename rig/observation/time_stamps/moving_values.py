@@ -6,7 +6,7 @@ from rig.estimation.arrays import Array
 
 
 def find_least_around(values: Array, width: int) -> Array:
-    """Return for each of n values the larger of two minima: of `width` values beginning with it, and ending with it.
+    """Return for each of n values the larger of two minima: of `width` values from it on, and of `width` up to it.
 
     At the ends, where one of the minima is missing, the other is returned.
     """

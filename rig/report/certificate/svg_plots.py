@@ -34,7 +34,7 @@ class UprightAxis:
 
     @classmethod
     def fit(cls, largest: float, units: Sequence[DisplayUnit]) -> "UprightAxis":
-        """Return an axis to a tenth beyond a round number, the next above `largest`, in a suitable one of `units`.
+        """Return an axis that ends a tenth beyond the next round number above `largest`, in one of `units`.
 
         The unit is the first in which `largest` is at least 1, or else the last.
         """

@@ -113,7 +113,7 @@ class Stamper:
         return passed_s, steps
 
     def _unwrap_time_s(self, printed: Array, column: LineTimeSection) -> Array:
-        """Return the time, s, from the row before each row to that row, across wraps of the device's time."""
+        """Return for each row the time, s, since the row before it, across wraps of the device's time."""
         unit_s, wrap = UNITS[column.unit].size, column.wrap
         last_time = printed[0] if self._last_time is None else self._last_time
         passed = np.diff(printed, prepend=last_time)
