@@ -60,7 +60,7 @@ class Steps:
         return np.where(wide, 2 * self.units, self.units)
 
     def reads_zero(self, axis: int, readings: Array) -> NDArray[np.bool_]:
-        """Return a mask (n,) of the readings of an `axis` that were truncated to zero; if `zero` is unknown, of all."""
+        """Return a mask (n,) of the readings of an `axis` that were truncated to zero; all if `zero` is unknown."""
         zero = float(np.broadcast_to(self.zero, len(self.units))[axis])
         if not np.isfinite(zero):
             return np.ones(len(readings), dtype=np.bool_)
