@@ -49,7 +49,7 @@ def column_sizes(readings: Array, squares: Array | None) -> Array:
 
 
 def least_squares(x: Array, sizes: Array, v_bar: Array) -> Array:
-    """Return β (…, p) of Eq. (6) for the design `x` (…, 3 N, p) with column norms `sizes`, and the motion `v_bar`."""
+    """Return β (…, p) of Eq. (6) for the design `x` (…, 3 N, p), scaled by column `sizes`, and the motion `v_bar`."""
     scaled = x / sizes[..., None, :]
     beta: Array = (np.linalg.pinv(scaled) @ v_bar.reshape(-1)) / sizes
     return beta
