@@ -26,8 +26,21 @@ TAIL_FRACTION = 0.1  # of the readings at either end of their range, which may n
 MAX_HALF_RANGE_RAD_S = 2 * RATE.steady
 
 
-def check_rests_agree(turning: Turning, solution: IncrementSolution) -> None:
-    """Raise Fault `bias_contradicts_rests` if the bias differs from readings at rest, `bias_jumped` if these jump.
+def include_rounding(solution: IncrementSolution, at_rest: MeansAtRest | None) -> IncrementSolution:
+    """Return the solution with the rounding of its bias, if the readings at rest have coarse steps.
+
+    At rest a reading without much noise repeats the same wrong number, which no mean and no other rest shows.
+    """
+    if at_rest is None or not (at_rest.rounding > MIN_ROUNDING * np.diag(solution.covariance)[BIAS]).any():
+        return solution
+    rounding = np.zeros_like(solution.covariance)
+    rounding[BIAS, BIAS] = np.diag(at_rest.rounding)
+    causes = {**solution.causes, ROUNDING: rounding}
+    return replace(solution, covariance=solution.covariance + rounding, causes=causes)
+
+
+def check_rests_agree(solution: IncrementSolution, at_rest: MeansAtRest | None) -> None:
+    """Raise Fault `bias_contradicts_rests` if the bias differs from the readings at rest, `bias_jumped` if these jump.
 
     A rest is used only if both the readings and the rows' attitudes show it. Rests may differ by their scatter, by
     motion that the reference does not show, and by the effect of gravity on a gyroscope.
