@@ -73,7 +73,7 @@ def subject_entry(subject: Subject) -> dict[str, Any]:
 
 
 def trend_entry(trend: Trend) -> dict[str, Any]:
-    """Return the trend of a parameter; null if there are too few calibrations."""
+    """Return the trend of a parameter for JSON, with null for what too few calibrations do not determine."""
     line, mean = trend.line, trend.mean
     return {
         "unit": trend.unit,

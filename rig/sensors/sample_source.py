@@ -26,7 +26,7 @@ class SampleSource(Protocol):
     def check(self, clock_s: float | None = None) -> None:
         """Raise an error that has occurred since the last call.
 
-        A silence counts only if another instrument's clock, now at `clock_s`, confirms it.
+        A silence counts only if the turner's clock, now at `clock_s`, confirms it.
         """
         ...
 

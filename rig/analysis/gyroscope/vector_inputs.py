@@ -175,7 +175,10 @@ def _encoder_errors(turns: Sequence[Observation], rests: int, uncertainty: Uncer
 
 
 def list_mount_rotations(stages: Sequence[int], rests: int, mount_deg: float) -> Array | None:
-    """Return the rotations (3 S, N, 3) of `VectorInputs` for mounts wrong by `mount_deg`; None with one stage."""
+    """Return `mount_turns_rad` (3 S, N, 3) of `VectorInputs`, for mounts that may be off by `mount_deg`.
+
+    N rows are the sweeps, whose stages are `stages`, and then `rests`, which no mount affects. None with one stage.
+    """
     first, *others = dict.fromkeys(stages)
     if not others:
         return None

@@ -144,8 +144,8 @@ def lag_pattern(movement: Movement, lag_s: float) -> Array:
 def drift_patterns(matrix: Array, attitudes: Array, drift: FieldDrift | None) -> tuple[Array, float]:
     """Return the patterns (3, 3 N) of a field that changes linearly over the attitudes, and the field's change, T.
 
-    Each axis of the base has one pattern. If the `drift` was tested, the change is its standard uncertainty, else an
-    assumed half-width.
+    Each axis of the base has one pattern. If the `drift` was tested, the change is the larger of the change found and
+    its standard deviation, over √3; else it is `UNTESTED_DRIFT_T`.
     """
     change_t = UNTESTED_DRIFT_T
     if drift is not None:

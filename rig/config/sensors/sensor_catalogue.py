@@ -89,7 +89,7 @@ class PartSpec:
         return nearest_rate(rate_hz, self.rates_hz, self.rates_rule)
 
     def accept_range(self, range_deg_s: float) -> float:
-        """Return `range_deg_s` if the part has it. Raise ValueError with the nearest otherwise."""
+        """Return `range_deg_s` if the part has this range. Otherwise raise ValueError with the part's nearest range."""
         return positive(range_deg_s) if self.any_rate else one_of(range_deg_s, self.ranges_deg_s)
 
 

@@ -53,8 +53,9 @@ class AbruptChange:
 
 @dataclass(frozen=True, slots=True)
 class PossibleChanges:
-    """Possible changes of `what`, of prior standard deviation `size`; `of_axes` (n, 3, 3) are their effects on n rows.
+    """Possible changes of `what` ("bias", "scale") of each axis, with the prior standard deviation `size`.
 
+    `of_axes` (n, 3, 3): the effect of a change of each axis (second index) by `size` on the three readings of n rows.
     `possible` (n, 3): whether an axis may have changed just before a row. `lasts`: whether the change affects all later
     rows too.
     """

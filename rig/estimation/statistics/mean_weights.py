@@ -52,6 +52,9 @@ def invert_squares(squares: Array) -> Array:
 
 
 def even_groups(part: NDArray[np.intp], parts: int) -> Array:
-    """Return the groups (n, p) for `mean_weights`; `part` (n,) is the index of a sample's part, −1 if it has none."""
+    """Return the groups (n, p) for `mean_weights` in which the samples of a part count alike: 1 in it, 0 elsewhere.
+
+    `part` (n,) is the index of each sample's part, −1 if it has none.
+    """
     groups: Array = (part[:, None] == np.arange(parts)).astype(np.float64)
     return groups

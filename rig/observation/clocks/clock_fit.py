@@ -52,8 +52,8 @@ def fit_clock(clock: TimeBase, board_time_s: Array, readings: Array, motion: Kno
     """Return the clock with which readings and motion agree best, at first only in their slow parts, then in all.
 
     The slow parts come first because a fast ripple fits as well if the offset is wrong by one of its periods, and
-    because filters change a fast ripple differently in readings and in states. If a finer fit fails or contradicts the
-    fit before it for this reason, return the clock of the earlier fit. Raise Fault `time_base_not_found`.
+    because filters change a fast ripple differently in readings and in states. If a finer fit fails, or contradicts the
+    fit before it, return the clock of the earlier fit. Raise Fault `time_base_not_found`.
     """
     first, *finer = _list_stages(clock, board_time_s, readings, motion)
     clock = _iterate_clock(clock, *first)

@@ -78,7 +78,8 @@ class Sampling:
     def gaps(self, time_s: Array, fewest: int = 1) -> NDArray[np.bool_]:
         """Return a mask (n − 1,) of steps between readings at times (n,) with at least `fewest` readings missing.
 
-        If stamps are bad, these are the steps that last as long as such a gap, and those from or to a late reading.
+        With late readings the missing ones cannot be counted. Then the mask has the steps that last as long as such a
+        gap, and those from or to a late reading.
         """
         if self.late is None:
             return np.asarray(self.missing >= fewest)

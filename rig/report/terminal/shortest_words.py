@@ -197,7 +197,7 @@ def _describe_floor(shortest: ShortestRun) -> str:
 
 
 def _efficiencies(directions: "Array") -> dict[str, dict[str, float]]:
-    """Return the efficiencies of the plan's `directions` and, for comparison, of the six in the paper SIX."""
+    """Return efficiencies by criterion: "plan" has those of `directions`, "six" those of the six in the paper SIX."""
     return {
         name: dict(_design_efficiencies(axes)) for name, axes in (("plan", directions), ("six", list_designs()["six"]))
     }

@@ -99,7 +99,10 @@ def guess(shape: Shape, still_until_s: float) -> Guess:
 
 
 def match_names(names: tuple[str, ...]) -> dict[int, str]:
-    """Return the names of columns in a header, by index; duplicates are ignored."""
+    """Return the rig's column names for the names in a header, by their index; unknown names have no entry.
+
+    Headings of which several have one meaning have no entry either.
+    """
     names_by_index: dict[int, str] = {}
     for index, name in enumerate(names):
         plain = re.sub(r"\s*[\[(].*?[\])]", "", name).strip().lower()

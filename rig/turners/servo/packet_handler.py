@@ -8,7 +8,7 @@ from rig.errors import Problem, Refused
 from rig.errors.extras import requiring
 from rig.turners.servo.driver_clock import HOST, Clock
 from rig.turners.servo.latency import lower_latency
-from rig.turners.servo.servo_port import Port
+from rig.turners.servo.servo_port import READ_WAIT_S, Port
 from rig.turners.servo.servo_registers import RETURN_LEVEL, Register
 
 # The errors of an unplugged port: pyserial's own is an OSError; a port closed meanwhile raises TypeError.
@@ -87,7 +87,7 @@ class Bus:
     def more_came(self, wait_s: float) -> bool:
         """Return whether another byte arrives within `wait_s`, without a request."""
         with self._failing():
-            for _ in range(max(1, round(wait_s / 0.002))):  # a read waits `READ_WAIT_S` of `servo_port`
+            for _ in range(max(1, round(wait_s / READ_WAIT_S))):
                 if self._port.readPort(1):
                     return True
         return False
