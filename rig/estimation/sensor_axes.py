@@ -76,9 +76,9 @@ def nearest_rotation(axes: Array) -> Array:
 
 
 def parameter_jacobian(matrix: Array, scale: Array) -> Array:
-    """Return the derivative (6, 12) of scale and bias with respect to `matrix` F, row by row, and the offset −bias.
+    """Return the derivative (6, 12) of scale and bias with respect to `matrix` F, row by row, and to the offset.
 
-    The scale factor k = 1/‖F_i‖ of axis i changes by δk = −k³ F_i·δF_i.
+    The offset is the bias with the opposite sign. The scale factor k = 1/‖F_i‖ of axis i changes by δk = −k³ F_i·δF_i.
     """
     jacobian = np.zeros((6, 12))
     jacobian[:3, :9].reshape(3, 3, 3)[PAIR_INDICES, PAIR_INDICES] = -(scale**3)[:, None] * matrix

@@ -123,9 +123,10 @@ def append_transfers(
 
 
 def _vibration_changes(windows: Sequence[SegmentedAverage], explained: VectorFit, times_s: Array) -> Array:
-    """Return the variances (M, 3), rad², of the vibration's change in M transfers, estimated from the nearest rests.
+    """Return the variances (M, 3), rad², of the angle by which vibration adds to the rotation in M transfers.
 
-    `times_s` (M, 2): start and end of the transfers on the clock of the first recording.
+    They are means of the variances in the rests nearest to the start and to the end of each transfer, `times_s` (M, 2)
+    on the clock of the first recording. The `windows` are those of the fit `explained`, in the same order.
     """
     rests = [
         (time_s, window.readings.vibration_rad2)

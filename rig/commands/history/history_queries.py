@@ -143,7 +143,7 @@ def rigs(options: Namespace) -> int:
 
 
 def import_runs(options: Namespace) -> int:
-    """Enter runs as solved from their recordings, and report the outcome of each. Return 1 if any was refused."""
+    """Enter runs whose results agree with their recordings, and report each. Return 1 if any was refused, else 0."""
     from rig.station.words import calibrations_in_words
 
     new = existing = refused = 0

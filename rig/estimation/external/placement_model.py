@@ -2,10 +2,12 @@
 
     v_m = F (s + φ s²) + b + E_m (ε_m + R_mᵀ γ(R_m)) + η_m + noise
 
-ε, independent in each placement, and η are the errors of `rig.estimation.external.placement`. γ is a smooth function of
-the attitude R: a Gaussian process over the angle between attitudes with Matérn's correlation (ν = 3/2). A robot with
-wrong joint zeros or a wrong tool frame has such errors, and so has a box that is out of square. γ may look like a bias
-or like other scale factors, so more placements reduce the effect of γ less than that of ε.
+v_m is the mean reading in placement m, s the reference in the sensor's frame, F the matrix, φ the quadratic term and b
+the bias. E_m is the derivative of v_m by small rotations of the placement. ε, independent in each placement, and η are
+the errors of `rig.estimation.external.placement`. γ is a smooth function of the attitude R: a Gaussian process over the
+angle between attitudes with Matérn's correlation (ν = 3/2). A robot with wrong joint zeros or a wrong tool frame has
+such errors, and so has a box that is out of square. γ may look like a bias or like other scale factors, so more
+placements reduce the effect of γ less than that of ε.
 """
 
 import numpy as np

@@ -150,7 +150,7 @@ class Movement:
         return [slice(*ends) for ends in pairwise(first)]
 
     def constant(self) -> Array:
-        """Return factors (K,) of the bias: 1 for a reading that contains it, 0 for a cosine or a sine."""
+        """Return the factors (K,) of the bias: 1 in dwells and means of sweeps, 0 in cosines and sines of sweeps."""
         return np.concatenate(
             [np.ones(len(self.dwells.readings_m_s2)), np.tile([1.0, 0.0, 0.0], len(self.sweeps.speeds_rad_s))]
         )

@@ -56,7 +56,11 @@ def least_squares(x: Array, sizes: Array, v_bar: Array) -> Array:
 
 
 def null_vector(x: Array, sizes: Array, norm: float, side: Array) -> Array:
-    """Return β (…, p) of Eq. (5) for the design `x` (…, 3 N, p) and a reference of this `norm` towards `side`."""
+    """Return β (…, p), the solution of the paper's homogeneous Eq. (5) X β = 0 for the design `x` (…, 3 N, p).
+
+    Its size and sign are free. They are chosen so that the reference in β has this `norm` and, of its two directions,
+    the one nearer to `side` (3,).
+    """
     _, _, directions = np.linalg.svd(x / sizes[..., None, :], full_matrices=False)
     beta = directions[..., -1, :] / sizes
     reference = beta[..., REFERENCE]

@@ -127,7 +127,7 @@ def bound_rounding_variance(readings: Array, steps: Steps, smooth: Array, scatte
 
 
 def _find_unit(axis: Array) -> float:
-    """Return the median distance between adjacent repeated numbers of readings (n,); zero if few numbers repeat."""
+    """Return the median step between neighbouring values that several readings (n,) have; zero if few values repeat."""
     values, often = np.unique(axis, return_counts=True)
     values, often = values[often >= MIN_REPEATS], often[often >= MIN_REPEATS]
     if len(values) < MIN_LEVELS or often.sum() < MIN_REPEATED_FRACTION * len(axis):

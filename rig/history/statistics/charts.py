@@ -86,9 +86,10 @@ def raise_alarms(deviation: Array, average: Array, limit: float | Array) -> Alar
 def _deviation(values: Array, std: Array, counted: Alarms) -> Array:
     """Return the deviation (…) of the last of results (…, i + 1) from the others, as a standard normal deviate.
 
-    Only the other results marked in `counted` are used. If all `std` are equal, the deviate is that of Student's
-    t = (x − x̄)/(s √(1 + 1/n)), with the last result x, and mean x̄ and standard deviation s of the n others. Otherwise
-    the mean is weighted, and the weights include the variance between runs (as in `random_effects.fit`).
+    Only the other results marked in `counted` are used. If all `std` are equal, Student's t = (x − x̄)/(s √(1 + 1/n)) is
+    converted to the normal deviate of equal probability; x is the last result, x̄ and s are the mean and the standard
+    deviation of the n others. Otherwise the mean is weighted, and the weights include the variance between runs (as in
+    `random_effects.fit`).
     """
     before, newest = values[..., :-1], values[..., -1]
     # First a mean with fixed weights, from which the variance between runs follows; then one with both variances.

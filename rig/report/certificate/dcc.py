@@ -1,7 +1,7 @@
 """The digital calibration certificate: PTB's DCC 3.2.1 over D-SI 2.1, with the full covariance.
 
-Numbers have all digits here; the page rounds them. Missing statements of the laboratory read "not stated", except the
-country, for which PTB's rules require a code of ISO 3166-1.
+Numbers have all digits here, and are rounded in the printed certificate. Missing statements of the laboratory read "not
+stated", except the country, for which PTB's rules require a code of ISO 3166-1.
 """
 
 from collections.abc import Iterable, Iterator, Sequence

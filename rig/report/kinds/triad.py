@@ -1,4 +1,4 @@
-"""The common parts of three-axis sensors in a result: scale factors, biases and axes, by one uncertainty budget."""
+"""The common parts of three-axis sensors in a result: scale factors, biases, axes, and their uncertainty budget."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -347,7 +347,7 @@ class Arm:
             self._changed.wait_for(lambda: self._problem is not None, MAX_REASON_WAIT_S)
 
     def _unbegun(self, problem: Problem) -> Problem:
-        """Return why a move did not begin: the controller refused it, or lost the client during a silence."""
+        """Return why a move did not begin: `problem`, or `link_lost` if the arm had been silent for too long."""
         if self._silent_s <= MAX_SILENCE_S:
             return problem
         what = f"the arm at {self._host} was silent for {self._silent_s:.1f} s, and {problem.what}"

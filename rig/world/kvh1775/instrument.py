@@ -144,7 +144,7 @@ class SimulatedKvh1775:
         self._sum = [0.0] * 6
 
     def _integrate(self, at_s: float) -> None:
-        """Add the mean of the motions at the last step and at `at_s` to the sum of which a delta angle is made."""
+        """Add the mean of the motions at the last step and at `at_s` to the sum from which a delta angle follows."""
         now = self._motion_at(at_s - self._truth.gyro.delay_s)
         before = self._before or now
         if now is before:  # the mean of two equal numbers is exact
