@@ -47,8 +47,8 @@ class Memory:
 class MountedSensor:
     """A sensor of this run: its name, its part, and its board (None: a port of its own).
 
-    `last`: the last calibration of its serial number. `other_board`: the last calibration on any board, but None if
-    that was the present board.
+    `last`: the last calibration of its serial number. `other_board`: the last calibration on a board; None if there is
+    none, or if it was made on the present board.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""The omissions from external readings, and notes on how the files were read."""
+"""The readings and rows of files that a solution leaves out, and notes on how the files were read."""
 
 from collections.abc import Iterator, Mapping
 

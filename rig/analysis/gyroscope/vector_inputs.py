@@ -200,7 +200,7 @@ def _group_by_axis(turns: Sequence[Observation]) -> list[list[int]]:
 
 
 def list_given(environment: MeasurementEnvironment, name: str) -> EarthRatePrior:
-    """Return the given values of environment and sensor for an estimate of the Earth's rate."""
+    """Return what the configuration states of the site, the arm and sensor `name`, for an estimate of Earth's rate."""
     site, uncertainty = environment.site, environment.uncertainty
     return EarthRatePrior(
         up=np.array(site.up),

@@ -100,7 +100,10 @@ _REMEDY = "See that each move is between two rests on the table, that no reading
 
 
 def _start(integrals: MoveIntegrals, faces: RestFaces, initial: GyroscopeModel) -> GraphState:
-    """Return initial values of the unknowns; attitudes follow from the moves, tilted so that the rest's face is up."""
+    """Return initial values of the unknowns.
+
+    The attitude at each rest is the one before, turned by the move, and tilted so that the face of that rest is up.
+    """
     attitudes = [_align_vertical(np.eye(3), faces.up[0])]
     for row, rotation in enumerate(integrals.rotations):
         attitudes.append(_align_vertical(attitudes[-1] @ rotation, faces.up[row + 1]))

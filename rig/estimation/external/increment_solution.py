@@ -323,16 +323,17 @@ CAUSES_OF_CONTRIBUTOR = {
 
 
 def _causes(settled: _ConvergedFit) -> dict[str, Array]:
-    """Return the parts of the parameters' covariance: one for each estimated error, and one for the priors."""
+    """Return the parts of the parameters' covariance by contributor; a parameter's prior is part of its contributor."""
     covariance = settled.solved.covariance
-    blind, *parts, _ = settled.model.causes(settled.std, settled.solved)
+    # First the part of the fixed covariance C₀, which is noise, and last that of all priors, which are added below.
+    fixed, *parts, _ = settled.model.causes(settled.std, settled.solved)
     by_cause = dict(zip(settled.causes.causes, parts, strict=True))
     nothing = np.zeros_like(covariance)
     causes = {
         name: np.sum([by_cause.get(cause, nothing) for cause in group], axis=0)
         for name, group in CAUSES_OF_CONTRIBUTOR.items()
     }
-    causes[NOISE] = causes[NOISE] + blind
+    causes[NOISE] = causes[NOISE] + fixed
     causes[DELAY] = causes[DELAY] + np.outer(covariance[CLOCK], covariance[CLOCK]) * CLOCK_STD_S**-2.0
     causes[ATTITUDES] = causes[ATTITUDES] + covariance[:, MATRIX] * MATRIX_PRECISION @ covariance[MATRIX]
     causes[EARTH_RATE] = covariance[:, EARTH] * EARTH_PRECISION @ covariance[EARTH]

@@ -227,7 +227,11 @@ def _arms(lever_m: Array, movement: Movement) -> Array:
 
 
 def _differentiate_delay(theta: Array, movement: Movement) -> Array:
-    """Return the derivative (K, 3) of the specific force with respect to the delay."""
+    """Return the derivative (K, 3) of the specific force with respect to the delay.
+
+    A delay turns cosine and sine of gravity in a sweep, by the speed times the delay (`even`). Where the sweep turns
+    unevenly, it also changes the lag between turning and readings (`uneven`), and the centripetal force (`later`).
+    """
     sweeps = movement.sweeps
     evenly = replace(movement, sweeps=replace(sweeps, turning_rad2_s2=np.zeros_like(sweeps.turning_rad2_s2)))
     waves = _harmonics_of_sweeps(project_reference(theta[DELAY], evenly) @ theta[REFERENCE], movement)

@@ -31,9 +31,8 @@ class Steps:
     """The steps of rounded numbers: `unit` (3,) of each axis, or one number for all axes.
 
     If `cut`, numbers were truncated toward zero, then shifted to the middle of their interval. Zero represents all
-    values within one unit in either direction, so the next values are one and a half units away from it. An offset
-    added later moves the readings that were zero: `zero` (3,) is their present value in units, modulo 1, NaN if
-    unknown.
+    values within one unit in either direction, so the next values are one and a half units away from it. If the
+    source added an offset afterwards, `zero` (3,) is the fraction of a unit by which zero has moved, NaN if unknown.
     """
 
     unit: Array | float

@@ -162,7 +162,7 @@ class RecomputeOutcome:
 
     @property
     def unreached(self) -> int:
-        """The number of recordings for which no answer came."""
+        """The number of recordings that were not solved again, because the recomputation ended before."""
         return sum(comparison.answer is None for comparison in self.compared)
 
     @property

@@ -34,8 +34,9 @@ def correlation_inflation(residuals: Array) -> float:
 def fit_noise_factor(residuals: Array) -> float:
     """Return the factor on a mean's variance from an autoregressive model, below 1 if residuals are mostly vibration.
 
-    Over many periods a vibration averages out, regardless of the sum of its correlations. A long mean's variance is the
-    spectrum at zero frequency, which is var(e) / (1 − Σ a)² with the model's coefficients a and innovations e.
+    Over many periods a vibration averages out, but the sum of its estimated correlations does not show that. So the
+    variance of a long mean is taken from the model's spectrum at zero frequency. This is var(e) / (1 − Σ a)², with the
+    coefficients a and innovations e.
     Akaike's criterion selects the order.
     """
     return fit_autoregression(residuals).factor

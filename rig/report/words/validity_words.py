@@ -43,7 +43,7 @@ def when_words(when: ConditionsEntry) -> str:
 
 
 def warmth_words(when: ConditionsEntry | None) -> str:
-    """Return a temperature's source in words."""
+    """Return in words where a temperature comes from: the item's thermometer (if None), a statement, or nowhere."""
     if when is not None and when.temperature_c is None:
         return "temperature neither measured by the item nor stated"
     if when is not None and when.temperature_stated:
