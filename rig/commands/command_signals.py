@@ -1,6 +1,7 @@
 """Signals that end a command from outside, but first stop the arm."""
 
 import signal
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
@@ -18,6 +19,7 @@ def end_by_interrupt() -> None:
     goes on moving.
     """
     INTERRUPTS.allow()
+    INTERRUPTS.send_lost_again()
     for number in MEANT_SIGNALS:
         # A script's `&` starts programs that ignore Ctrl-C, which must stop an arm all the same. A run that is to
         # outlive its terminal ignores only SIGHUP (nohup).
@@ -42,10 +44,12 @@ def ending_by_interrupt() -> Iterator[None]:
     """Make signals raise KeyboardInterrupt in the block as `end_by_interrupt` does, then restore the handlers."""
     changed = ENDING_SIGNALS if _PRINTING_BEHIND is None else (*ENDING_SIGNALS, _PRINTING_BEHIND)
     before = {number: signal.getsignal(number) for number in changed}
+    report = sys.unraisablehook
     end_by_interrupt()
     try:
         yield
     finally:
+        sys.unraisablehook = report
         for number, handler in before.items():
             signal.signal(number, handler if handler is not None else signal.SIG_DFL)
 

@@ -4,7 +4,7 @@ import signal
 import sys
 import threading
 from collections.abc import Iterator
-from types import FrameType
+from types import FrameType, SimpleNamespace
 
 import pytest
 
@@ -69,3 +69,29 @@ def test_a_burst_of_signals_is_one_interrupt(interrupts: Interrupts) -> None:
     interrupts.allow()
     with pytest.raises(KeyboardInterrupt):
         signal.raise_signal(signal.SIGUSR1)
+
+
+class Signalled:
+    """An object during whose destruction a signal comes, whose exception Python then drops."""
+
+    def __del__(self) -> None:
+        signal.raise_signal(signal.SIGUSR1)
+
+
+def test_a_signal_during_a_destructor_is_not_lost(interrupts: Interrupts, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "unraisablehook", sys.unraisablehook)
+    interrupts.send_lost_again()
+    with pytest.raises(KeyboardInterrupt, match="interrupted"):
+        Signalled()
+        signal.pause()
+
+
+def test_other_exceptions_that_python_drops_are_reported(
+    interrupts: Interrupts, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    dropped = []
+    monkeypatch.setattr(sys, "unraisablehook", lambda unraisable: dropped.append(unraisable.exc_type))
+    interrupts.send_lost_again()
+    interrupts.send_lost_again()  # as a second command in one process does
+    sys.unraisablehook(SimpleNamespace(exc_type=ValueError, exc_value=ValueError()))  # all that it reads
+    assert dropped == [ValueError]

@@ -2,6 +2,7 @@
 
 import _thread
 import signal
+import sys
 import threading
 import time
 from types import FrameType
@@ -45,12 +46,27 @@ class Interrupts:
     """
 
     def __init__(self) -> None:
+        self._raised: int | None = None  # the signal that raised the last exception
+        self._report = sys.unraisablehook  # of other exceptions that Python cannot raise
         self.allow()
 
     def allow(self) -> None:
         """Permit the next signal to raise an exception, however soon after the last signal."""
         self._raised_s = float("-inf")
         self._first_s: float | None = None  # arrival of the signal that waits for a lock
+
+    def send_lost_again(self) -> None:
+        """Send a signal again from now on if Python drops its exception, as in a destructor or in a callback."""
+        if sys.unraisablehook != self._resend:
+            self._report, sys.unraisablehook = sys.unraisablehook, self._resend
+
+    def _resend(self, dropped: "sys.UnraisableHookArgs") -> None:
+        """Handle an exception that Python has dropped: send its signal again, or report another exception."""
+        if self._raised is None or not isinstance(dropped.exc_value, KeyboardInterrupt):
+            self._report(dropped)
+            return
+        self.allow()
+        _thread.start_new_thread(_send_later, (_thread.get_ident(), self._raised))
 
     def hear(self, number: int, frame: FrameType | None, text: str = "") -> None:
         """Raise an exception for a signal, except within a burst of signals.
@@ -65,7 +81,7 @@ class Interrupts:
             if now_s - self._first_s < BURST_S:
                 _thread.start_new_thread(_send_later, (_thread.get_ident(), number))
                 return
-        self._raised_s, self._first_s = now_s, None
+        self._raised_s, self._first_s, self._raised = now_s, None, number
         raise KeyboardInterrupt(*filter(None, [text]))
 
 
