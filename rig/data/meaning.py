@@ -1,4 +1,4 @@
-"""The meaning of a check of the verdict."""
+"""What a check of the verdict is about: the sensor, the quantity, the parameter and the criterion."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -37,7 +37,10 @@ class CubicSpline:
         self._coefficients = (cubic, quadratic, slopes[:-1], flat[:-1].copy()), (3 * cubic, 2 * quadratic, slopes[:-1])
 
     def __call__(self, x: ArrayLike, derivative: int = 0, columns: NDArray[np.intp] | None = None) -> Array:
-        """Return the values at `x`, or with `derivative` 1 their derivatives; of y (n, k) only `columns`, if given."""
+        """Return the spline's values at `x`, or its slopes there if `derivative` is 1.
+
+        If `columns` are given, only these of the k splines are evaluated.
+        """
         if derivative not in (0, 1):
             raise ValueError(f"derivative {derivative} of a spline: 0 and 1 are there")
         x = np.asarray(x, dtype=np.float64)

@@ -109,7 +109,7 @@ def _range_or_none(text: str) -> str:
 def look_at_device(
     port: str, baud: int | None, name: str, seconds: tuple[float, float], user: "StatedProperties"
 ) -> str:
-    """Read lines of a device at rest, then in rotation; return its section as YAML, and print their properties.
+    """Read lines of a device at rest, then in rotation; print what they show, and return the sensor's YAML section.
 
     `seconds` are the two durations. Raise Refused as `listen` does; `lines_no_pattern` for lines without a common
     pattern; for a session by hand, `lines_not_turned` if no columns look like a gyroscope's.

@@ -162,8 +162,8 @@ class ReadingTask:
     def parts(self) -> list[Part]:
         """Return the parts that the reader yields, once it has ended.
 
-        Raise `UnreadableFile` for a file that cannot be read, `CostlyFile` for one beyond the limits; Refused
-        `temporary_folder_full`, and as the reader does.
+        Raise `UnreadableFile` for a file that cannot be read, `CostlyFile` for one beyond the limits, Refused
+        `temporary_folder_full`, and the errors that the reader raises.
         """
         try:
             complaint = _wait_for(self._process, self._limits.idle_s)

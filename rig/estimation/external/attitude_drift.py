@@ -323,7 +323,7 @@ def _weigh_bias(averaged: FixedAttitudes, fixes: Fixes) -> Array:
 
 
 def _find_bias_changes(sensitivities: Array, nearby: Array, middles_s: Array, weights: Array) -> Array:
-    """Return the covariance (3n, 3n) of the increments due to unit changes of the bias b with attitude and time.
+    """Return the covariance (3n, 3n) of n increments due to changes of the bias, of unit std, with attitude and time.
 
     `sensitivities` (n, 3, 12) are derivatives of the increments with respect to matrix and bias, `nearby` (n, n) is the
     correlation due to similar attitudes, `middles_s` (n,) are the middle times. Changes are relative to the mean bias

@@ -55,7 +55,7 @@ class GatheredFixes:
 
     @property
     def increments(self) -> int:
-        """The number of increments between consecutive fixes, including those that were left out."""
+        """The number of increments between consecutive fixes, including the increments that were left out."""
         return len(self.fixes.joined)
 
 

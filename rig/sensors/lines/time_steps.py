@@ -9,9 +9,10 @@ STEP_GROWTH = 2.0  # by which the step of a single-precision number grows if the
 
 
 def find_time_step_s(printed: Array, decimals: int, unit: str) -> float:
-    """Return the step, s, of a device's times (n,) with `decimals` digits, also for later times of the same device.
+    """Return the step, s, of a device's times (n,) in `unit`, printed with `decimals` digits.
 
     A time in single precision, with 24 bits, has the step of its last bit, regardless of the number of printed digits.
+    This step grows with time, so twice the present one is returned, which holds until the time has doubled.
     """
     last_digit = 10.0**-decimals
     single = np.float32(printed)
