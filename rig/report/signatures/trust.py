@@ -4,13 +4,14 @@ import asyncio
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 if TYPE_CHECKING:
     from asn1crypto.crl import CertificateList
-    from cryptography.x509 import Certificate
+    from cryptography.x509 import Certificate, Extension, ExtensionType
     from pyhanko_certvalidator.authority import CertTrustAnchor
 
+ExtensionT = TypeVar("ExtensionT", bound="ExtensionType")
 RSA_MIN_BITS, EC_MIN_BITS = 2048, 256  # ETSI TS 119 312, clause 6.2: recommended today
 MAX_CLOCK_ERROR = timedelta(days=1)  # of this computer, or in its time zone
 DOCUMENT_PURPOSES = {
@@ -100,14 +101,11 @@ def _no_path(chain: Sequence[bytes], trust: Trust, moment: datetime, lists: "Seq
 
 def _unfit_authority(certificate: "Certificate") -> Iterator[str]:
     """Yield reasons why an authority of this certificate vouches for no signer of documents."""
-    from cryptography.x509 import BasicConstraints, ExtensionNotFound
+    from cryptography.x509 import BasicConstraints
 
     name = certificate.subject.rfc4514_string()
-    try:
-        is_authority = certificate.extensions.get_extension_for_class(BasicConstraints).value.ca
-    except ExtensionNotFound:
-        is_authority = False
-    if not is_authority:
+    constraints = _find_extension(certificate, BasicConstraints)
+    if constraints is None or not constraints.value.ca:
         yield f"it was issued by {name}, who is no authority"
     yield from (f"its authority {name}: the {why}" for why in (*_other_purposes(certificate), *_weak_key(certificate)))
 
@@ -118,27 +116,22 @@ def unfit_for_documents(certificate: "Certificate") -> Iterator[str]:
     A certificate without key usage is not accepted, although RFC 5280 (4.2.1.3) permits it all usages, because
     certificates of web servers from small authorities often state no key usage.
     """
-    from cryptography.x509 import ExtensionNotFound, KeyUsage
+    from cryptography.x509 import KeyUsage
 
-    try:
-        usage = certificate.extensions.get_extension_for_class(KeyUsage).value
-        signs = usage.digital_signature or usage.content_commitment
-    except ExtensionNotFound:
-        signs = False
-    if not signs:
+    usage = _find_extension(certificate, KeyUsage)
+    if usage is None or not (usage.value.digital_signature or usage.value.content_commitment):
         yield "its certificate is not made for signing documents: the key usage is not digitalSignature"
     yield from (f"its {why}" for why in (*_other_purposes(certificate), *_weak_key(certificate)))
 
 
 def _other_purposes(certificate: "Certificate") -> Iterator[str]:
     """Yield the purposes of a certificate, if it states them (extended key usage) and documents are not among them."""
-    from cryptography.x509 import ExtendedKeyUsage, ExtensionNotFound
+    from cryptography.x509 import ExtendedKeyUsage
 
-    try:
-        stated = certificate.extensions.get_extension_for_class(ExtendedKeyUsage).value
-    except ExtensionNotFound:
+    stated = _find_extension(certificate, ExtendedKeyUsage)
+    if stated is None:
         return
-    purposes = [purpose.dotted_string for purpose in stated]
+    purposes = [purpose.dotted_string for purpose in stated.value]
     if not DOCUMENT_PURPOSES.keys() & purposes:
         yield f"certificate is not made for signing documents: its extended key usage is {', '.join(purposes)}"
 
@@ -157,20 +150,26 @@ def _weak_key(certificate: "Certificate") -> Iterator[str]:
 
 def unfit_for_stamps(certificate: "Certificate", moment: datetime, now: datetime) -> Iterator[str]:
     """Yield reasons why a time server of this certificate could not stamp at the time `moment` (RFC 3161, 2.3)."""
-    from cryptography.x509 import ExtendedKeyUsage, ExtensionNotFound
+    from cryptography.x509 import ExtendedKeyUsage
     from cryptography.x509.oid import ExtendedKeyUsageOID
 
-    try:
-        extension = certificate.extensions.get_extension_for_class(ExtendedKeyUsage)
-        is_alone = [*extension.value] == [ExtendedKeyUsageOID.TIME_STAMPING] and extension.critical
-    except ExtensionNotFound:
-        is_alone = False
-    if not is_alone:
+    stated = _find_extension(certificate, ExtendedKeyUsage)
+    if stated is None or not stated.critical or [*stated.value] != [ExtendedKeyUsageOID.TIME_STAMPING]:
         yield "its certificate is not made for time stamps alone"
     if not certificate.not_valid_before_utc <= moment <= certificate.not_valid_after_utc:
         yield f"its certificate was not valid on {moment:%Y-%m-%d}"
     if moment > now + MAX_CLOCK_ERROR:
         yield f"it is of {moment:%Y-%m-%d}, which is to come"
+
+
+def _find_extension(certificate: "Certificate", kind: type[ExtensionT]) -> "Extension[ExtensionT] | None":
+    """Return the extension of a `kind` in a certificate, or None without it."""
+    from cryptography.x509 import ExtensionNotFound
+
+    try:
+        return certificate.extensions.get_extension_for_class(kind)
+    except ExtensionNotFound:
+        return None
 
 
 def _other_name(certificate: "Certificate", expected: str | None) -> str:

@@ -209,8 +209,7 @@ class HandSession:
             missed_rad = last.angle_rad - whole_rad * max(1, round(last.angle_rad / whole_rad))
         if missed_rad is None or abs(missed_rad) <= MAX_CLOSURE_STDS * self.settings.closure_rad:
             return None
-        what = f"that turn ended {abs(np.degrees(missed_rad)):.1f}° from where it began"
-        return Fault("turn_not_closed", what, "Lay it against the rule, and turn again")
+        return _turn_not_closed(f"that turn ended {abs(np.degrees(missed_rad)):.1f}° from where it began")
 
     def _laid_after_turn(self, now: SessionProgress) -> Fault | None:
         """Return a fault if the item was laid down again after a whole turn, so that it lies anywhere, else None."""
@@ -219,8 +218,7 @@ class HandSession:
             return None
         if not now.moves or not now.moves[-1].turns:
             return None
-        what = "after that turn it was laid down again, and need not touch the rule as before"
-        return Fault("turn_not_closed", what, "Lay it against the rule, and turn again")
+        return _turn_not_closed("after that turn it was laid down again, and need not touch the rule as before")
 
     def _next(self, now: SessionProgress, face: Face | None) -> Instruction | None:
         """Return the next instruction, or None if the session has enough moves."""
@@ -315,6 +313,10 @@ def drain(heard: "SimpleQueue[tuple[str, NDArray[Any]]]") -> Iterator[tuple[str,
     """Yield the samples that have arrived, with their sensor's name, without waiting for more."""
     while not heard.empty():
         yield heard.get()
+
+
+def _turn_not_closed(what: str) -> Fault:
+    return Fault("turn_not_closed", what, "Lay it against the rule, and turn again")
 
 
 def _explain(wrong: Fault) -> str:
