@@ -70,10 +70,11 @@ class VerifiedFile:
 def run(options: Namespace) -> int:
     """Verify each file and print the findings; return 0, or the exit status that `--help` lists.
 
-    Raise Refused `bad_option`, `verify_file`, and what `read_trusted_certificates`, `inspect_file` and `open_history`
-    raise.
+    Raise Refused `bad_option`, `verify_file`, and what `read_trusted_certificates`, `inspect_within_limits` and
+    `open_history` raise.
     """
-    from rig.report.signatures.inspection import inspect_file, read_trusted_certificates
+    from rig.report.signatures.inspection import read_trusted_certificates
+    from rig.report.signatures.inspection_process import inspect_within_limits
     from rig.report.signatures.trust import Trust
 
     if options.signer is not None and not options.trust:
@@ -81,7 +82,7 @@ def run(options: Namespace) -> int:
         raise Refused("bad_option", what, "Give --trust CERTIFICATE too, or leave it out")
     trust = Trust(read_trusted_certificates(options.trust), options.signer)
     contents = {file: _read_content(file) for file in options.files}
-    looks = {file: inspect_file(file.name, content, trust) for file, content in contents.items()}
+    looks = {file: inspect_within_limits(file, content, trust) for file, content in contents.items()}
     named = read_history_name(options.history)
     history_answers = {} if named is None else _look_up(named, contents, looks)
     files = [_judge(file, contents[file], looks, history_answers.get(file)) for file in contents]

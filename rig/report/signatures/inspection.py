@@ -19,8 +19,8 @@ HEAD_BYTES = 200  # enough to detect the type of a file
 
 def inspect_file(name: str, content: bytes, trust: Trust) -> FileInspection:
     """Return the inspection of a file as PDF, XML or unsigned, by its content. Raise Refused `missing_extra`."""
-    is_pdf = content.startswith(b"%PDF-")
-    if not is_pdf and not _is_xml(content):
+    is_pdf = _is_pdf(content)
+    if not may_be_signed(content):
         return FileInspection(problems=(not_signed(name),))
     if len(content) > (limit := PDF_MAX_BYTES if is_pdf else XML_MAX_BYTES):
         return FileInspection(problems=(not_as_signed(name, f"it is longer than {limit} bytes, as no certificate is"),))
@@ -32,11 +32,22 @@ def inspect_file(name: str, content: bytes, trust: Trust) -> FileInspection:
     try:
         with warnings.catch_warnings(action="ignore"):  # warnings of the libraries about the file's content
             return inspect(name, content, trust)
+    except MemoryError:
+        raise
     except Exception as error:  # the libraries raise any error for a crafted file
         why = str(error).strip().splitlines()
         return FileInspection(
             problems=(not_as_signed(name, f"it cannot be read: {why[0] if why else type(error).__name__}"),)
         )
+
+
+def may_be_signed(content: bytes) -> bool:
+    """Return whether a file is of a type that can hold a signature, PDF or XML, by how its content begins."""
+    return _is_pdf(content) or _is_xml(content)
+
+
+def _is_pdf(content: bytes) -> bool:
+    return content.startswith(b"%PDF-")
 
 
 def _is_xml(content: bytes) -> bool:

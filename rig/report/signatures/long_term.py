@@ -13,7 +13,7 @@ from rig.report.signatures.signatory import SIZE_MAX_BYTES, Signatory
 if TYPE_CHECKING:
     from pyhanko_certvalidator import ValidationContext
 
-LIST_MAX_BYTES = 16 * SIZE_MAX_BYTES  # an authority may have revoked many
+LIST_MAX_BYTES = 5 * SIZE_MAX_BYTES  # a hundred thousand revoked certificates
 _LIST = re.compile(rb"-----BEGIN X509 CRL-----.*?-----END X509 CRL-----", re.DOTALL)
 
 

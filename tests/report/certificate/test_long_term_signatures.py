@@ -3,7 +3,7 @@
 import io
 import subprocess
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from pyhanko_certvalidator import ValidationContext
 from rig.errors import Refused
 from rig.report.signatures.findings import FileInspection
 from rig.report.signatures.inspection import inspect_file
+from rig.report.signatures.inspection_process import LARGE_BYTES, LIMITS, inspect_within_limits
 from rig.report.signatures.long_term import read_authorities
 from rig.report.signatures.reason import Reason
 from rig.report.signatures.signatory import signatory
@@ -45,11 +46,11 @@ class Signing:
     def trust(self) -> list[bytes]:
         return [self.authority.chain[0].public_bytes(Encoding.DER)]
 
-    def signed(self, *lists: bytes) -> bytes:
+    def signed(self, *lists: bytes, drawing: bytes = b"q Q") -> bytes:
         file = self.folder / "authority.pem"
         file.write_bytes(b"".join((*lists, self.authority.certificates())))
         with signatory(str(self.key)) as by:
-            return sign_as_pades(page(), by, Reason("A test"), self.time_server, read_authorities([file]))
+            return sign_as_pades(page(drawing), by, Reason("A test"), self.time_server, read_authorities([file]))
 
 
 @pytest.fixture
@@ -62,9 +63,9 @@ def signing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Signing
         yield Signing(laboratory.p12(tmp_path / "key.p12"), laboratory, authority, url, tmp_path)
 
 
-def page() -> bytes:
+def page(drawing: bytes = b"q Q") -> bytes:
     writer = PdfFileWriter()
-    content = writer.add_object(StreamObject(stream_data=b"q Q"))
+    content = writer.add_object(StreamObject(stream_data=drawing))
     writer.insert_page(PageObject(contents=content, media_box=(0, 0, 200, 200)))
     out = io.BytesIO()
     writer.write(out)
@@ -97,6 +98,25 @@ def test_the_lists_are_signed_too_and_clear_the_signer_and_other_programs_agree(
     for context, clear in ((with_lists, True), (ValidationContext(crls=[], **asked), False)):
         status = validate_pdf_signature(reader.embedded_signatures[0], context)
         assert status.intact and status.trusted is clear
+
+
+def test_a_large_certificate_is_inspected_in_a_process_of_its_own_with_the_same_findings(signing: Signing) -> None:
+    made = signing.signed(revocation_list(signing.authority), drawing=b"q Q " * (LARGE_BYTES // 4))
+    file = signing.folder / "certificate.pdf"
+    file.write_bytes(made)
+    looked = inspect_within_limits(file, made, Trust(tuple(signing.trust)))
+    assert looked == seen(made, signing.trust) and looked.signatures[0].long_term
+
+
+def test_a_crafted_pdf_that_takes_too_much_memory_or_time_is_not_valid(tmp_path: Path) -> None:
+    references = b"1 0 R " * (10 * LARGE_BYTES // 6)
+    body = b"%PDF-1.7\n1 0 obj\n<</Type/Catalog/Names[" + references + b"]>>\nendobj\n"
+    table = b"xref\n0 2\n0000000000 65535 f\r\n0000000009 00000 n\r\ntrailer\n<</Size 2/Root 1 0 R>>\n"
+    crafted = body + table + f"startxref\n{len(body)}\n%%EOF\n".encode()
+    (file := tmp_path / "crafted.pdf").write_bytes(crafted)
+    limits = replace(LIMITS, memory_bytes=LIMITS.memory_bytes // 2, processor_s=0.0)
+    (problem,) = inspect_within_limits(file, crafted, Trust(), limits).problems
+    assert problem.name == "not_as_signed" and "it takes more than" in problem.what
 
 
 def test_the_claim_is_made_only_where_an_authority_is_trusted(signing: Signing) -> None:
