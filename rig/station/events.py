@@ -258,7 +258,7 @@ class DocumentWritten:
 
 @dataclass(frozen=True, slots=True)
 class Plotted:
-    """Plots were written to the run folder, as PNG and SVG under these names without their endings."""
+    """Plots were written to the run folder, each as PNG and as SVG; `names` are the file names without extension."""
 
     names: tuple[str, ...]
 

@@ -58,18 +58,17 @@ CONVERTER_DIGITS = Digits(True, Steps(1.0))
 
 
 def find_digits(sensor: RecordedSensor, quantity: Quantity, samples: Sequence[NDArray[Any]]) -> Digits:
-    """Return the steps of a quantity's recorded numbers, from all samples (n,) of each recording.
+    """Return the steps of a quantity's recorded numbers, at least one count, from all samples (n,) of each recording.
 
-    A board records the counts of the part's converter. Other sources send computed or printed numbers. If such a number
-    changes in steps of several recorded counts, it has no bits to test. A step is at least one count.
+    The bits can be tested of a board's numbers, which are the counts of the part's converter. Other sources send
+    computed or printed numbers; their bits mean nothing if the numbers change in steps of several counts.
     """
     channel = sensor.channel(quantity)
-    steps = channel.steps(
-        np.concatenate([channel.values(recorded) for recorded in samples]), trusts_counts=sensor.on_board
-    )
-    counts = replace(steps, unit=np.maximum(steps.units / channel.unit_per_count, 1.0))
-    has_bits = not steps.cut and (sensor.on_board or bool(counts.units.max() <= MAX_STEP_COUNTS))
-    return Digits(has_bits, counts)
+    values = np.concatenate([channel.values(recorded) for recorded in samples])
+    steps = channel.steps(values, trusts_counts=sensor.on_board)
+    steps_counts = replace(steps, unit=np.maximum(steps.units / channel.unit_per_count, 1.0))
+    are_counts = sensor.on_board or bool(steps_counts.units.max() <= MAX_STEP_COUNTS)
+    return Digits(are_counts and not steps.cut, steps_counts)
 
 
 def judge_readings(

@@ -1,8 +1,8 @@
 """The prediction of a plan's uncertainty: the budget of a simulated recording. Pure functions.
 
 The plan determines the joints' motion, the configuration determines the known errors of turner, site and sensor, and
-the data sheet determines the sensor's noise. Only two parts of a budget come from readings alone: the bias drift beyond
-flicker, and the temperature change.
+the data sheet determines the sensor's noise. Two parts of a budget cannot be predicted and are left out, because only
+readings show them: the bias drift beyond flicker, and the temperature change.
 """
 
 from collections.abc import Iterator

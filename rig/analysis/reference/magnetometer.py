@@ -35,8 +35,9 @@ class MagnetometerResult:
     """One magnetometer's calibration, reading m = F B + b of a field B, in the axes of its nominal mounting.
 
     - `field_t`: the size of the field; `extension_m` (3,): the sensor's position on the flange.
-    - `triad`: scale, relative to `field_t`, and axes, with the solution's uncertainty; `budget`: the uncertainty.
-    - `uniformity`: the test of the field over the attitudes; `drift`: its drift, None without two tests at home.
+    - `triad`: scale, relative to `field_t`, and axes, with the statistical uncertainty; `budget`: the total.
+    - `uniformity`: the test of the field over the attitudes.
+    - `drift`: the drift of the field between measurements at the home pose, None if there were fewer than two.
     - `measurements`: the means from which the solution is estimated, in tesla.
     - `other_methods`: the solutions by the other methods, or the Fault of a method that fails.
     """

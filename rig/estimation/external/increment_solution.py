@@ -228,9 +228,6 @@ def _check(fixes: Fixes, remaining: Fixes, settled: _ConvergedFit) -> None:
     rms_rad = float(np.sqrt(np.mean(settled.solved.residuals**2)))
     if rms_rad > MAX_ATTITUDE_ERROR_RAD:
         raise refusals.untrustworthy_attitudes(f"the increments of attitudes and gyroscope differ by {rms_rad:.2g} rad")
-    outliers = np.concatenate(
-        [np.flatnonzero(fixes.joined & ~remaining.joined), np.flatnonzero(remaining.joined)[_find_outliers(settled)]]
-    )
     std_s = float(np.sqrt(settled.solved.covariance[CLOCK, CLOCK]))
     if abs(settled.state.clock_s) > MAX_CLOCK_STDS * CLOCK_STD_S + max(2 * std_s, CLOCK_ROUNDING_S):
         raise Fault(
@@ -239,8 +236,11 @@ def _check(fixes: Fixes, remaining: Fixes, settled: _ConvergedFit) -> None:
             f"ms, but the largest allowed offset is {1e3 * MAX_CLOCK_STDS * CLOCK_STD_S:.0f} ms",
             "Write both files by one clock, or let --estimate-clock-offset find the difference",
         )
+    # An increment that the fit has left out is no longer joined in `remaining`.
+    left_out = np.flatnonzero(fixes.joined & ~remaining.joined)
+    outliers = np.concatenate([left_out, np.flatnonzero(remaining.joined)[_find_outliers(settled)]])
     if len(outliers) > _limit_outliers(fixes):
-        where_s = float(fixes.at_s[np.searchsorted(fixes.fix, outliers.min())])
+        where_s = float(fixes.at_s[fixes.fix == outliers.min()][0])  # the first sample of the increment's first fix
         raise refusals.untrustworthy_attitudes(
             f"{len(outliers)} of {fixes.joined.sum()} increments contradict all others, the first after {where_s:.2f} s"
         )

@@ -153,8 +153,8 @@ def laid_down(theta: Array, placed: AttitudeReadings, unplaced: Array, unplaced_
 def _relate_errors(laid: PlacementSolution, all_rests: AttitudeReadings, stated: int) -> PlacementSolution:
     """Return the solution of a model in which errors of the first `stated` attitudes may vary smoothly with attitude.
 
-    The covariance is that at the most probable standard deviations of the errors, enlarged so that its 95 % intervals
-    are those averaged over all standard deviations.
+    The covariance is computed at the most probable standard deviations of the errors. It is then enlarged until its
+    95 % intervals are those of the posterior that is marginalized over these standard deviations.
     """
     model, theta = build_placement_model(laid.theta, all_rests, stated), laid.theta.copy()
     maxima = model.find_maxima()

@@ -66,9 +66,10 @@ def bias_warming(movement: Movement) -> Array:
 
 
 def scale_warming(theta: Array, movement: Movement) -> Array:
-    """Return the patterns (6, 3 K) of one standard uncertainty of the temperature coefficient of each axis's scale.
+    """Return how the temperature coefficients of the scales change all readings (6, 3 K) of K segments.
 
-    Three are for the recorded temperature, three for changes smaller than a step of the thermometer.
+    Each row is the effect of one standard uncertainty of one axis's coefficient: three rows for the recorded
+    temperature, three for temperature changes smaller than a step of the thermometer.
     """
     sensor = movement.sensor_errors
     if sensor is None:

@@ -33,7 +33,7 @@ class JointTurn:
     """The motion of the joint that turns, at n times.
 
     - `speed_rad_s`: 2π over the time of a revolution, negative if the angle falls.
-    - `angle_rad` (n,): from the arm's states, zero in the known attitude.
+    - `angle_rad` (n,): from the arm's states, zero at the start of the revolution.
     - `acceleration_rad_s2` (n,): see `estimate_acceleration`.
     """
 

@@ -22,11 +22,11 @@ STEP_SCATTER, COARSE_STEP_S = 0.2, 0.05
 
 
 class TableMotion:
-    """A `KnownMotion` from rows that follow each other closely; a row states the attitude at its middle.
+    """A `KnownMotion` from table rows in close succession, each of which covers a short interval.
 
-    `middles_s` (n,) are on the table's clock, in any order; `attitudes` (n, 3, 3) transform body to table coordinates;
-    `rates_rad_s` (n, 3) are in body coordinates, None if only the attitudes are known. Raise Fault
-    `time_base_not_found`.
+    `middles_s` (n,) are the middles of these intervals on the table's clock, in any order; `attitudes` (n, 3, 3)
+    transform body to table coordinates; `rates_rad_s` (n, 3) are in body coordinates, None if only the attitudes are
+    known. Raise Fault `time_base_not_found`.
     """
 
     def __init__(self, middles_s: Array, attitudes: Array, rates_rad_s: Array | None) -> None:

@@ -197,7 +197,7 @@ def _read_messages(reader: Any, connections: Any) -> Iterator[tuple[float, Any]]
 
 
 def _frames(message: Any) -> tuple[str, ...]:
-    """Return the names of the frames in a message: that of its sensor or room and, of a transform, the body's."""
+    """Return the frame names in a message: the one in its header and, for a transform, the body's (child) frame."""
     return (message.header.frame_id, *([message.child_frame_id] if hasattr(message, "child_frame_id") else []))
 
 

@@ -227,8 +227,8 @@ def _choose_middle(peak: float, residuals: Array, previous: Array, fraction: Arr
 def _refine(cycles: Array, residuals: Array, fixed: int, fraction: Array, sidebands: int) -> Array:
     """Return the frequencies of spectral lines, in cycles, refined from their phase drift.
 
-    The phase drift of a line shows in the part of its amplitude that grows in quadrature. The first `fixed` lines, and
-    lines that consist of sidebands only and so have no phase, are unchanged.
+    A wrong frequency shows as a component that grows in proportion to time, 90° out of phase with the line. The first
+    `fixed` lines are unchanged, and so are lines of sidebands only, which have no carrier whose phase could drift.
     """
     for _ in range(PASSES):
         fitted = fit_columns(waves(cycles, fraction, sidebands), residuals)

@@ -157,7 +157,7 @@ def _is_misleading(time_s: Array, interval_s: float, resolution_s: float) -> boo
 
 
 def _has_late(time_s: Array, single: _PeriodCandidate) -> bool:
-    """Return whether readings were late rather than lost, because there are many short steps for the number of gaps."""
+    """Return whether readings were late rather than lost: a late one makes a gap, and short steps after the gap."""
     return bool(np.count_nonzero(np.diff(time_s) < SHORT_STEP * single.interval_s) > MAX_SHORT_RATIO * single.gap_count)
 
 

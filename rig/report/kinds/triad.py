@@ -153,7 +153,7 @@ def triad_kind(
     standard: Standard,
     characteristics: tuple[Characteristic, ...],
 ) -> ResultKind[Any]:
-    """Return the kind of a sensor that is calibrated in attitudes, with its entries at `key` and its `words`."""
+    """Return how results of a sensor calibrated in attitudes are shown: its `key` in the document, and its `words`."""
 
     def find(document: ResultDocument) -> Iterator[Finding[Any]]:
         all_entries: Mapping[str, Any] = getattr(document, key)

@@ -44,7 +44,10 @@ class MagneticFieldReader:
         return self._assemble(rows[~incomplete], axes[~incomplete])
 
     def _assemble(self, rows: NDArray[Any], axes: NDArray[np.int64]) -> NDArray[Any]:
-        """Return a sample for each reading number whose three axes x, y, z are in successive rows, at the time of y."""
+        """Return one sample per reading, with the time of its y row.
+
+        A reading is complete if its x, y and z rows follow one another and carry the same sequence number.
+        """
         starts = np.flatnonzero(axes == 0)
         starts = starts[starts + 2 < len(rows)]
         same = (rows["sequence"][starts] == rows["sequence"][starts + 2]) & (axes[starts + 2] == 2)

@@ -26,7 +26,8 @@ Windows = Sequence[tuple[float, float]]
 class SimulatedTruth:
     """The truth of all simulated sensors, without noise; each value is a mean over windows (n, 2) of time, s.
 
-    Rotation and gravity act on one axis after the other, so that oblique axes and mounting have no influence.
+    Each value is that of one sensor axis while rotation or gravity acts along this axis alone, so that oblique axes and
+    mounting have no influence.
     """
 
     def __init__(self, config: RigConfig, world: WorldSection) -> None:
