@@ -30,12 +30,12 @@ from rig.sensors.lines.log_columns import LogColumns, guess_columns
 class LookedFile:
     """The contents of a file.
 
-    - layout, guess: for a table; None for a bag or an autopilot's log.
+    - layout: the layout of a table; guess: the probable content of its columns; None for other files.
     - columns: the map of its columns, in the form of `--columns`, incomplete if it contains "?".
     - samples, survey: its readings, if any can be read; others: number of rows without readings; note: what the
       readings lack.
     - origin_s: origin of the readings' times; the attitudes' times are on their own clock.
-    - attitudes: the reports of a reference, if the file has one; omitted_attitudes: the rows that are no reports.
+    - attitudes: the reports of a reference, if the file has one; omitted_attitudes: number of rows without a valid one.
     - refusals: why readings or attitudes could not be read.
     """
 

@@ -122,7 +122,10 @@ def _accelerations(run: RunData, recorded: Mapping[str, _RecordedPart]) -> Attem
 
 
 def _fields(run: RunData, recorded: Mapping[str, _RecordedPart]) -> Attempts[QuantityInDwell, ReadAtRest]:
-    """Return each magnetometer's mean in each dwell of an accelerometer on the same clock, or the dwell's Fault."""
+    """Return each magnetometer's mean in each dwell, or the dwell's Fault if the dwell could not be read.
+
+    The dwells are those of an accelerometer that shares the magnetometer's clock and shows when the arm rests.
+    """
     expected_t = run.settings.site.magnetic_field_t
     fields: Attempts[QuantityInDwell, ReadAtRest] = Attempts()
     for name in run.measuring(FIELD):

@@ -372,9 +372,9 @@ class DeviationEntry(Entry):
 
 
 class RevolutionErrorEntry(Entry):
-    """Mean reading minus mean reference over one revolution; `gravity_rad_s` is the part due to gravity, if known.
+    """Mean reading minus mean reference, over one revolution or over an arc of `angle_rad`.
 
-    Over an arc `angle_rad` is the angle turned. Gravity includes the centripetal acceleration.
+    `gravity_rad_s` is the part of it due to gravity and centripetal acceleration, if known.
     """
 
     sweep: int

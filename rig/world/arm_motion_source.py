@@ -102,7 +102,7 @@ class ArmMotionSource:
         return self.arm.motion_at(time_s)
 
     def frames_at(self, time_s: float) -> Frames:
-        """Return rotation (rows) and position (m) of the base and of every link, the flange last."""
+        """Return, for the base and each link up to the flange, the rotation to base axes (rows) and the position, m."""
         return self.arm.frames_at(time_s)
 
 

@@ -200,7 +200,10 @@ def _fork(
 
 
 def read_apart(reader: str, path: Path, arguments: Mapping[str, Any], limits: ReadingLimits) -> list[Part]:
-    """Return the parts of a file that a `reader` yields: see `ReadingTask`. Raise as `ReadingTask.parts` does."""
+    """Run a `reader` on a file in a process of its own, within `limits`, and return the parts that it yields.
+
+    See `ReadingTask` for the arguments. Raise as `ReadingTask.parts` does.
+    """
     with ReadingTask(reader, path, arguments, limits) as reading:
         return reading.parts()
 

@@ -2,8 +2,11 @@
 
     v_m = F (s + φ s²) + b,   s = Rᵀ v_ref + v̄
 
-R maps the body frame to the table frame. θ holds F (row by row), v_ref, b, and φ (3,) with second-order terms: 15 or 18
-numbers. The least-squares fit weighted by the readings' variances is the maximum likelihood estimate; Gauss–Newton
+v_m is a mean reading, and s the true quantity in body axes. R maps the body frame to the table frame, v_ref is fixed to
+the table, and v̄ is the known part of s, such as a joint's rate. θ holds F (row by row), v_ref and b: 15 numbers, or 18
+with φ (3,) if the model has second-order terms.
+
+The least-squares fit weighted by the readings' variances is the maximum likelihood estimate; Gauss–Newton
 reaches it from the paper's estimate in a few steps. With v̄ = 0, F and v_ref are identifiable only up to a common
 factor, so ‖v_ref‖ is fixed.
 

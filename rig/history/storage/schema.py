@@ -1,6 +1,7 @@
-"""The tables of a history. Rows are only added, never changed (`triggers`, `journal`).
+"""The tables of a history. Rows are only added, never changed, as the modules `triggers` and `journal` ensure.
 
-`run.result` is the complete `result.json`; all other columns of a run, its calibrations and parameters index it.
+`run.result` holds the complete `result.json`. All other columns of runs, calibrations and parameters repeat parts of it
+for searches.
 """
 
 from typing import Any

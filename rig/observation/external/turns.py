@@ -64,10 +64,11 @@ class DeclaredTurns:
 def find_turns(
     time_s: Array, readings: Array, declared: DeclaredTurns, sweeps: Sequence[Observation], rests: Sequence[Average]
 ) -> TurnedData | None:
-    """Return the turns that, according to readings (n, 3) in rad/s, start and end at rest; None if there are none.
+    """Return the turns among the `sweeps`: those that start and end at rest, by the readings (n, 3) in rad/s.
 
-    The other `sweeps` stay sweeps, and their mean readings are among the `means` of the result. Turns with gaps that
-    may hide too much rotation are left out. `rests` are the rests that the file states.
+    `declared` are the stated angles of the sweeps, `rests` the rests that the file states. The mean readings of sweeps
+    that are not turns are among the `means` of the result. Turns with gaps that may hide too much rotation are left
+    out. Return None if there are no turns.
     """
     pauses = _find_pauses(time_s, sweeps)
     found_rests = find_rests(time_s, {RATE: readings}, lying=pauses)

@@ -51,11 +51,11 @@ def _is_ros_1(path: Path) -> bool:
 
 
 def bag_readings(path: Path, inside: str | None) -> Iterator[Part]:
-    """Yield, in blocks, the readings of the topic `inside` a bag, or of its only topic of type Imu.
+    """Yield, in blocks, the readings of a bag's topic named `inside`, or if None of the only topic of type Imu.
 
     The columns are as in a CSV file, times are measured from the beginning of the bag, and rows have the order of the
-    bag. Messages without a rate are left out and counted. If any other message lacks an acceleration, all accelerations
-    are left out. Raise Refused `missing_extra` or `bag_topic`, and any error of the parser for a damaged bag.
+    bag. Messages without a rate are left out and counted. If any of the remaining messages lacks an acceleration, no
+    accelerations are read. Raise Refused `missing_extra` or `bag_topic`, and any error of the parser for a damaged bag.
     """
     with _open_bag(path) as reader:
         chosen = _select_topic(reader, (IMU,) if inside is None else (IMU, MAGNETIC), inside, "readings")

@@ -62,8 +62,8 @@ def note_of(parts: Sequence[Part]) -> str:
 def parts_read_apart(reader: str, path: Path, arguments: Mapping[str, Any], *, else_: str, remedy: str) -> list[Part]:
     """Return the parts of a file that a `reader` ("module:function") yields in a process of its own.
 
-    Raise Refused as the reader does, `temporary_folder_full`, and for any other failure `no_file` or `file_too_costly`,
-    with `else_` as the predicate of its message.
+    Raise Refused: any that the reader raises; `temporary_folder_full`; `file_too_costly` if the process exceeds its
+    limits; `no_file` for any other failure. Messages of the last two are the path, `else_` and the cause.
     """
     try:
         return read_apart(reader, path, arguments, limits_for(stored_bytes(path)))

@@ -64,12 +64,12 @@ def turn_speed(time_s: NDArray[np.float64], q_rad: NDArray[np.float64]) -> TurnS
 
 
 def _std_of_mean(later_s: NDArray[np.float64], time_s: NDArray[np.float64], beyond_rad: NDArray[np.float64]) -> float:
-    """Return the std of the mean of `beyond_rad` (n,), the angles by which n readings one turn later exceed one turn.
+    """Return the standard deviation of the mean of `beyond_rad` (n,).
 
-    Difference i is the angle at `later_s[i]`, interpolated between readings j and j + 1 with the weight w, minus
-    reading i. With white errors e of the readings, the error of difference i is (1 − w) e_j + w e_{j+1} − e_i. The
-    scatter of the differences gives the variance of a single reading. The variance of the mean difference then follows
-    from the total weight of each reading in all differences.
+    Element i is the angle turned from `time_s[i]` to `later_s[i]`, minus one turn. The angle at `later_s[i]` is
+    interpolated between readings j and j + 1, with weight w. If the readings have white errors e, element i has the
+    error (1 − w) e_j + w e_{j+1} − e_i. The scatter of the elements gives the variance of a single reading; the
+    variance of their mean follows from the total weight of each reading in all elements.
     """
     pairs, count = len(beyond_rad), len(time_s)
     after = np.searchsorted(time_s, later_s, side="right").clip(1, count - 1)

@@ -1,8 +1,9 @@
-"""The script line that ends a program, sent to the primary interface over plain TCP: a stop in every PolyScope.
+"""A stop by a script line that ends the program, sent to the primary interface over plain TCP.
 
-The controller itself reads the line, not the program on its screen that serves the dashboard. The controller accepts
-lines only in remote control, and acknowledges no line. In local control it answers each line with an error, C210. Its
-states, ten a second, show whether a program runs. Sources: the maker's client library, `PrimaryClient::commandStop`;
+It works with every version of PolyScope, because the controller itself reads the line; the dashboard is served by the
+program on the teach pendant. The controller accepts lines only in remote control, and acknowledges none. In local
+control it answers each line with the error C210. The states that the controller sends ten times a second show whether a
+program runs. Sources: the maker's client library, `PrimaryClient::commandStop`;
 client interface description: robot mode data, sub-package 0 of a robot state.
 """
 
