@@ -89,14 +89,15 @@ def parameter_jacobian(matrix: Array, scale: Array) -> Array:
 def angle_jacobian(axes: Array, scale: Array, rotation: Array) -> Array:
     """Return the derivative (6, 9) of non-orthogonality and mounting `rotation` with respect to the matrix F, by rows.
 
-    A row a_i of the axes A changes by δa_i = k_i (I − a_i a_iᵀ) δF_i. The mounting R of A = S R changes by δR = [δθ]×
-    R, in which (I tr S − S) δθ is the axial vector of M − Mᵀ with M = δA Rᵀ.
+    A row a_i of the axes A, with scale factor k_i, changes by δa_i = P_i δF_i with P_i = k_i (I − a_i a_iᵀ). The
+    non-orthogonality arcsin(a_i·a_j) changes by (a_j·δa_i + a_i·δa_j) / √(1 − (a_i·a_j)²). The mounting R of A = S R
+    changes by δR = [δθ]× R, in which (I tr S − S) δθ is the axial vector of M − Mᵀ with M = δA Rᵀ.
     """
     project = scale[:, None, None] * (IDENTITY - axes[:, :, None] * axes[:, None, :])
     stretch = axes @ rotation.T
     cosines = np.sqrt(1 - (axes @ axes.T)[FIRST_AXES, SECOND_AXES] ** 2)
-    # P_i a_j and P_i r_j of the two axes of each pair: pair, row of F, element
-    sines = (axes @ project)[PAIR_INDICES, OTHER_AXIS] * (IN_PAIR / cosines[:, None])[..., None]
+    # P_i a_j, and below P_i r_j with the rows r_j of R, for the two axes of each pair: pair, row of F, element
+    angles = (axes @ project)[PAIR_INDICES, OTHER_AXIS] * (IN_PAIR / cosines[:, None])[..., None]
     axial = (rotation @ project)[PAIR_INDICES, OTHER_AXIS] * AXIS_ORDER[..., None]
     turns = np.linalg.solve(stretch.trace() * IDENTITY - stretch, axial.reshape(3, 9))
-    return np.concatenate([sines.reshape(3, 9), turns])
+    return np.concatenate([angles.reshape(3, 9), turns])

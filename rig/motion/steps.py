@@ -79,7 +79,7 @@ class Sweep:
 
     @property
     def angle_rad(self) -> float:
-        """The averaged angle: exactly 2π n if it is n whole turns."""
+        """The angle over which readings are averaged: exactly 2π n for n whole turns."""
         low, high = self.revolution_rad
         return TURN_RAD * round((high - low) / TURN_RAD) if closes(high - low) else high - low
 

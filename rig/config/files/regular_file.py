@@ -42,7 +42,8 @@ def shut_files(identities: Callable[[], Iterable[FileIdentity]]) -> Iterator[Non
 def open_regular_file(path: Path, max_bytes: int, *, follow_links: bool = True) -> Iterator[BinaryIO]:
     """Yield a regular file of at most `max_bytes`, open for reading.
 
-    Raise `UnfitFile`, and OSError as `open` does. Links in another user's folder must not be followed.
+    Raise `UnfitFile`, and OSError as `open` does. Pass `follow_links=False` for a folder in which another
+    user can create links.
     """
     # Checked before opening: to open a device may have effects.
     _check(path.stat() if follow_links else path.lstat(), max_bytes)

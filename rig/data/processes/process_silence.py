@@ -48,9 +48,10 @@ class Silence:
         self.ticks += not (starved or unheard)
 
     def lasts_over(self, limit: float) -> bool:
-        """Return whether more than `limit` ticks were silent, or more than `limit` × `spared` ticks passed in all.
+        """Return whether the silence lasted more than `limit` ticks in which the process could have run.
 
-        The `limit` is for a machine with a processor for every program; the machine's load extends it.
+        So that the wait ends in any case, `spared` times as many ticks of any kind suffice. The `limit` is that of a
+        machine with a processor for every program; it is multiplied by the machine's load.
         """
         if max(self.ticks, self._all_ticks / self._spared) <= limit:
             return False

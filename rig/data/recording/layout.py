@@ -80,7 +80,7 @@ def parse_sensor(name: str, attributes: Mapping[str, Any]) -> RecordedSensor:
 
 
 def check_rows(contents: Contents) -> None:
-    """Raise ValueError if rows do not have the type that the file's texts and descriptions state."""
+    """Raise ValueError if a data set's rows do not have the type that the file's attributes describe."""
     states_dtype = contents.turner.dtype if contents.turner else ARM_STATE_DTYPE
     rows = {
         f"samples/{name}": (contents.samples[name], sensor.sample_dtype) for name, sensor in contents.sensors.items()

@@ -26,10 +26,10 @@ class TemperatureWanted:
 
 @dataclass(frozen=True, slots=True)
 class SetMeasured:
-    """The end of the sweeps and dwells at one temperature, while the sensors were `warming` or cooling.
+    """All sweeps and dwells of one temperature step are recorded.
 
-    The sweeps and dwells have the indices from `first` up to, not including, `end`. `temperatures_c` are the mean
-    temperatures of the sensors' own thermometers, by sensor name.
+    Their indices are from `first` up to, not including, `end`. `warming`: whether the sensors became warmer or, if
+    false, colder during them. `temperatures_c` are the mean temperatures of the sensors' own thermometers, by name.
     """
 
     first: Index

@@ -54,11 +54,11 @@ class ErrorSizes:
 
 
 def estimate_variances(fit: ResidualInputs, fractions: Sequence[float]) -> ErrorSizes:
-    """Return the root-mean-squares of random walk and attitude error over their posterior, and the mean fraction.
+    """Return the random walk and the attitude error: root mean squares over their posterior on a grid.
 
     The prior of the random walk is spike-and-slab, with a log-uniform slab; that of the attitude error is log-uniform.
-    The `fractions` are possible fractions of the attitude error's variance that are independent in each dwell; all are
-    equally probable.
+    A fraction of the attitude error's variance is independent in each dwell. The `fractions` are its possible values,
+    all equally probable; their mean, weighted by the posterior variance, is returned too.
     """
     constant = np.diag(fit.walk) > 0
     typical = np.sqrt(np.median(fit.noise[constant]) / np.median(np.diag(fit.walk)[constant]))
@@ -69,10 +69,11 @@ def estimate_variances(fit: ResidualInputs, fractions: Sequence[float]) -> Error
     residuals, covariance, walk = (free @ fit.residuals, free @ fit.covariance @ free.T, free @ fit.walk @ free.T)
     whiteners = [np.linalg.inv(np.linalg.cholesky(covariance + rate**2 * walk)) for rate in walks]
     of_arm = [free @ fit.effects(fraction) for fraction in fractions]
+    # Axes: fraction, walk, attitude error.
     log_posterior = np.array(
-        [[_find_likelihoods(residuals, whitener, effects, sizes) for whitener in whiteners] for effects in of_arm]
+        [[_find_log_likelihoods(residuals, whitener, effects, sizes) for whitener in whiteners] for effects in of_arm]
     )
-    log_posterior[:, 1:] -= np.log(WALK_POINTS)
+    log_posterior[:, 1:] -= np.log(WALK_POINTS)  # all points of the slab together are as probable as the spike, walk 0
     weights = np.exp(log_posterior - log_posterior.max())
     weights /= weights.sum()
     walk_square, attitude_square = weights.sum(axis=(0, 2)) @ walks**2, weights.sum(axis=1) @ sizes**2
@@ -108,7 +109,7 @@ def estimate_disturbances(
     return expected
 
 
-def _find_likelihoods(residuals: Array, whitener: Array, effects: Array, sizes: Array) -> Array:
+def _find_log_likelihoods(residuals: Array, whitener: Array, effects: Array, sizes: Array) -> Array:
     """Return log-likelihoods (k,) of residuals (n,), up to a constant, for attitude errors of the `sizes` (k,).
 
     `whitener` (n, n), triangular, whitens all modelled errors except the arm's `effects` (n, P).

@@ -77,10 +77,10 @@ def _deviation(recording: ObservedRun, stream: Stream, turn: Observation, observ
 
 
 def _nuisance_columns(time_s: Array, turn: Observation, rates_rad_s: Array) -> Array:
-    """Return the nuisance columns (n, k) of the computer's mean, at times (n,) with rates (n,) about the axis.
+    """Return the columns (n, k) that the computer's mean of a turn cancels and the board's mean does not.
 
-    The weights of that mean cancel these columns: spectral lines, the turn's first two harmonics, and the effect of a
-    slow ripple on a lagging sensor, in this order.
+    They are at times (n,), with rates (n,) about the axis: spectral lines, the turn's first two harmonics, and the
+    effect of a slow ripple on a lagging sensor, in this order.
     """
     average = turn.average
     fraction = (time_s - average.start_s) / average.duration_s

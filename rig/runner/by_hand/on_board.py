@@ -67,7 +67,10 @@ class FollowedSession:
     _has_asked: bool = False
 
     def take(self, report: HandReport) -> None:
-        """Process the board's report and announce its changes; restart if the board's button began a new session."""
+        """Process the board's report, and announce what it changes.
+
+        If the board's button began a new session, discard what was accepted in the session before.
+        """
         wrong = None
         if self.reports and report.judged < self.reports[-1].judged:
             self._has_asked = False

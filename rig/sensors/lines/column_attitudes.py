@@ -1,4 +1,4 @@
-"""The columns of attitudes in an unknown log: quaternions, and rotation matrices and angles, which are not read."""
+"""The columns of attitudes in an unknown log. Quaternions are read; matrices and angles are named, but not read."""
 
 import re
 from collections.abc import Sequence
