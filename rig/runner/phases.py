@@ -103,40 +103,59 @@ class Run:
     ) -> tuple[RunData, ...]:
         """Carry out the phase's script, with `results` of the previous calibration; return all recordings of the phase.
 
-        During the mounting for a stage nothing is connected, because cables may have to be unplugged. Raise Fault
-        `run_folder_removed`.
+        Raise Fault `run_folder_removed`.
         """
-        readings = phase.procedure.readings
         with self.report_end(self._advice, moved=moved):
             plan = phase.plan()
-        stages = plan.stages
-        open_stages = [number for number, stage in enumerate(stages) if stage.indices - resumed.done]
-        for number in open_stages or [max(len(stages) - 1, 0)]:
-            if stages:
-                with self.report_end(self._advice, moved=moved):
-                    self._confirm_mounting(plan, number)
-            path = self._record_stage(phase, number, resumed, moved=moved, results=results)
-            if stages:
-                with self.report_end(self._advice_to_repeat, moved=True):
-                    earlier = [read_run(file) for file in recordings(self.folder, readings)]
-                resumed = Resumption(earlier, resumed.done | stages[number].indices)
-                phase, moved = replace(phase, agreed=True), True
+        record = self._record_stages if plan.stages else self._record_stage
+        path = record(phase, plan, resumed, moved=moved, results=results)
         with self.report_end(self._advice_to_repeat, moved=True):
-            files = recordings(self.folder, readings)
-            if path not in files:  # pyrefly: ignore[unbound-name]  # one stage at least
-                raise Fault(
-                    "run_folder_removed",
-                    f"{path} does not exist any more",
-                    "Start a new run, and leave its folder in its place until the run has ended",
-                )
-            if phase.procedure.reads_corrected:
-                files = files[-1:]  # a complete movement; interrupted ones before it do not count
-            for file in files[:-1]:
-                make_plain(file)  # otherwise only a reader of interrupted files could open it
-            return tuple(read_run(file) for file in files)
+            return self._read_recordings(phase, path)
+
+    def _record_stages(
+        self, phase: Phase, plan: Plan, resumed: Resumption, *, moved: bool, results: Mapping[str, SensorResult] | None
+    ) -> Path:
+        """Carry out the script for each stage that is not done, else for the last one; return the last path.
+
+        During the mounting for a stage nothing is connected, because cables may have to be unplugged.
+        """
+        open_stages = [number for number, stage in enumerate(plan.stages) if stage.indices - resumed.done]
+        paths: list[Path] = []
+        for number in open_stages or [len(plan.stages) - 1]:
+            with self.report_end(self._advice, moved=moved):
+                self._confirm_mounting(plan, number)
+            paths.append(self._record_stage(phase, plan, resumed, moved=moved, results=results, stage=number))
+            # For the next stage this one is an earlier recording, and the operator has agreed to the motion.
+            with self.report_end(self._advice_to_repeat, moved=True):
+                earlier = [read_run(file) for file in recordings(self.folder, phase.procedure.readings)]
+            resumed = Resumption(earlier, resumed.done | plan.stages[number].indices)
+            phase, moved = replace(phase, agreed=True), True
+        return paths[-1]
+
+    def _read_recordings(self, phase: Phase, newest: Path) -> tuple[RunData, ...]:
+        """Return all recordings of a phase. Raise Fault `run_folder_removed` if the `newest` is not among them."""
+        files = recordings(self.folder, phase.procedure.readings)
+        if newest not in files:
+            raise Fault(
+                "run_folder_removed",
+                f"{newest} does not exist any more",
+                "Start a new run, and leave its folder in its place until the run has ended",
+            )
+        if phase.procedure.reads_corrected:
+            files = files[-1:]  # a complete movement; interrupted ones before it do not count
+        for file in files[:-1]:
+            make_plain(file)  # otherwise only a reader of interrupted files could open it
+        return tuple(read_run(file) for file in files)
 
     def _record_stage(
-        self, phase: Phase, stage: int, resumed: Resumption, *, moved: bool, results: Mapping[str, SensorResult] | None
+        self,
+        phase: Phase,
+        plan: Plan,
+        resumed: Resumption,
+        *,
+        moved: bool,
+        results: Mapping[str, SensorResult] | None,
+        stage: int = 0,
     ) -> Path:
         """Carry out the phase's script for a stage, or for a whole plan without stages; return the recording's path."""
         path = next_recording(self.folder, phase.procedure.readings)

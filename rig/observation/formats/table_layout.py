@@ -3,7 +3,7 @@
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
 from typing import Any, cast
@@ -103,42 +103,58 @@ def find_layout(path: Path, largest_mb: int) -> TableLayout:
 def layout_parts(path: Path, largest_mb: int) -> Iterator[Part]:
     """Yield the layout of a file as one part. Raise Refused `wrong_columns` if the file has no rows of numbers."""
     if is_mat(path):
-        columns = read_mat_columns(path)
-        rows = _find_table_rows(columns)
-        columns = {name: column for name, column in columns.items() if len(column) == rows}
-        count = min(rows, SAMPLED_ROWS)
-        cells = [list(row) for row in zip(*(spell_numbers(column[:count]) for column in columns.values()), strict=True)]
-        yield _describe(0, [*columns], [""] * len(columns), cells, [NAN] if _have_nan(columns) else [], rows)
+        yield _layout_of_mat(path)
         return
     skip, groups, heading = _find_beginning(path, largest_mb)
     data = read_rows(path, largest_mb, skip)
     if heading:
         next(data)
-    heading = _join_headings(groups, heading) if groups else heading
-    sampled: list[list[str]] = []
-    units, missing, count = [""] * len(heading), set[str](), 0
-    for row in data:
-        if not any(map(str.strip, row)) or (heading and repeats(row, [name.strip() for name in heading])):
-            continue
-        if count and is_comment(row):
-            continue
-        if not count and not any(map(is_value, row)) and any(map(unit_of, row)):
-            units = [cell.strip() for cell in row]
-            continue
-        count += 1
-        missing |= MISSING_WORDS.intersection(map(str.strip, row))
-        if len(sampled) < SAMPLED_ROWS:
-            sampled.append(row)
+    heading = [name.strip() for name in (_join_headings(groups, heading) if groups else heading)]
+    table = _sample_rows(data, heading)
     # A blank cell at the end of each row is none: some loggers end every line by a separator.
-    width = max([len(heading), *(len(strip_blank_end([*map(str.strip, row)])) for row in sampled[:2])])
+    width = max([len(heading), *(len(strip_blank_end([*map(str.strip, row)])) for row in table.sampled[:2])])
     # R writes no heading for the column of row numbers.
-    shift = width - len(heading) if heading and len(heading) == width - 1 else 0
-    headings = [""] * shift + [name.strip() for name in heading]
-    headings += [""] * (width - len(headings))
-    units = [""] * shift + units + [""] * (width - shift - len(units))
-    cells = [[*row[:width], *[""] * (width - len(row))] for row in sampled]
+    shift = 1 if heading and len(heading) == width - 1 else 0
+    headings, units, *cells = (
+        (row + [""] * width)[:width] for row in ([""] * shift + heading, [""] * shift + table.units, *table.sampled)
+    )
     named = {"is_shifted": bool(shift), "has_groups": bool(groups)}
-    yield {**_describe(skip, headings, units, cells, sorted(missing), count), **named}
+    yield {**_describe(skip, headings, units, cells, sorted(table.missing), table.count), **named}
+
+
+def _layout_of_mat(path: Path) -> dict[str, Any]:
+    columns = read_mat_columns(path)
+    rows = _find_table_rows(columns)
+    columns = {name: column for name, column in columns.items() if len(column) == rows}
+    count = min(rows, SAMPLED_ROWS)
+    cells = [list(row) for row in zip(*(spell_numbers(column[:count]) for column in columns.values()), strict=True)]
+    return _describe(0, [*columns], [""] * len(columns), cells, [NAN] if _have_nan(columns) else [], rows)
+
+
+@dataclass(slots=True)
+class _SampledTable:
+    """The first rows of a table, its row of units, if any, the texts for missing values, and the number of all rows."""
+
+    sampled: list[list[str]] = field(default_factory=list)
+    units: list[str] = field(default_factory=list)
+    missing: set[str] = field(default_factory=set)
+    count: int = 0
+
+
+def _sample_rows(rows: Iterator[list[str]], heading: Sequence[str]) -> _SampledTable:
+    """Return a sample of the rows below the heading, without blank rows, comments and repeated headings."""
+    table = _SampledTable()
+    for row in rows:
+        if not any(map(str.strip, row)) or (heading and repeats(row, heading)) or (table.count and is_comment(row)):
+            continue
+        if not table.count and not any(map(is_value, row)) and any(map(unit_of, row)):
+            table.units = [cell.strip() for cell in row]
+            continue
+        table.count += 1
+        table.missing |= MISSING_WORDS.intersection(map(str.strip, row))
+        if len(table.sampled) < SAMPLED_ROWS:
+            table.sampled.append(row)
+    return table
 
 
 def _names_columns(heading: Sequence[str], below: Sequence[Sequence[str]]) -> bool:
