@@ -58,7 +58,7 @@ def median(values: NDArray[Any], axis: int = -1) -> Array:
 
 
 def distinct(values: NDArray[Any]) -> NDArray[Any]:
-    """Return the distinct ones among a few values of any shape, in rising order."""
+    """Return the distinct values of an array of any shape, in rising order."""
     ordered = np.sort(values, axis=None)
     return ordered[np.append(True, ordered[1:] != ordered[:-1])[: len(ordered)]]
 
@@ -105,7 +105,10 @@ def runs_between(changes: NDArray[np.bool_], count: int) -> NDArray[np.intp]:
 
 
 def bisect(is_too_small: Callable[[Array], Array | NDArray[np.bool_]], highest: Array) -> Array:
-    """Return the values (q,), between 0 and `highest` (q,), below which `is_too_small` is true, by bisection."""
+    """Return by bisection the smallest values (q,), between 0 and `highest` (q,), that are not too small.
+
+    `is_too_small` takes q values and returns for each whether it is too small.
+    """
     low, high = np.zeros_like(highest), highest
     for _ in range(BISECTION_STEPS):
         middle = (low + high) / 2

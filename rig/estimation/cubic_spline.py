@@ -39,7 +39,7 @@ class CubicSpline:
     def __call__(self, x: ArrayLike, derivative: int = 0, columns: NDArray[np.intp] | None = None) -> Array:
         """Return the spline's values at `x`, or its slopes there if `derivative` is 1.
 
-        If `columns` are given, only these of the k splines are evaluated.
+        `columns` are indices of the columns of y that are evaluated, all by default.
         """
         if derivative not in (0, 1):
             raise ValueError(f"derivative {derivative} of a spline: 0 and 1 are there")
@@ -61,7 +61,7 @@ class CubicSpline:
 
 
 def _slopes(step: Array, secants: Array) -> Array:
-    """Return the slopes (n, k) at the knots, from the steps (n − 1,) and the slopes of the secants (n − 1, k)."""
+    """Return the spline's slopes (n, k) at n knots, from the steps (n − 1,) between knots and the secants' slopes."""
     if len(step) == 1:
         return np.repeat(secants, 2, axis=0)
     before, after = step[:-1, None], step[1:, None]
@@ -87,7 +87,8 @@ def _slopes(step: Array, secants: Array) -> Array:
 def _end_condition(step: float, following: float, secant: Array, next_secant: Array) -> Array:
     """Return the right side r (k,) of the not-a-knot condition: `following` · s₀ + (`step` + `following`) · s₁ = r.
 
-    s₀ and s₁ are the slopes at the end and at the next knot.
+    s₀ and s₁ are the slopes of the spline at its end and at the next knot. `step` is the width of the outer interval,
+    `following` that of the next one; `secant` and `next_secant` (k,) are the slopes of the secants there.
     """
     both = step + following
     end: Array = ((step + 2 * both) * following * secant + step**2 * next_secant) / both

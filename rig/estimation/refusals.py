@@ -65,7 +65,7 @@ def check_variances(variances: Array) -> None:
 
 
 def check_count(observations: int, least: int, parameters: int) -> None:
-    """Raise Fault `too_few_observations` for fewer than `least` observations."""
+    """Raise Fault `too_few_observations` for fewer than `least` observations; its message states `parameters`."""
     if observations < least:
         raise Fault(
             "too_few_observations",
@@ -138,7 +138,10 @@ def check_reads(matrix: Array) -> None:
 
 
 def check_unit(scale: Array, confusions: Sequence[tuple[float, str]] = ANGLE_UNIT_RATIOS) -> None:
-    """Raise Fault `wrong_unit` for a scale factor (3,) above 4 or below 1/4, naming the likely one of `confusions`."""
+    """Raise Fault `wrong_unit` if a scale factor (3,) is above 4 or below 1/4.
+
+    `confusions` are pairs: the ratio of reading to true value that a wrong unit causes, and a text that explains it.
+    """
     if not is_plausible(scale).all():
         typical = float(np.exp(np.mean(np.log(scale))))
         raise wrong_unit(f"the scale factors come out near {typical:.3g}", 1 / typical, confusions)
@@ -151,13 +154,13 @@ def check_reading_ratio(ratio: float, where: str) -> None:
 
 
 def is_plausible(ratio: ArrayLike) -> NDArray[np.bool_]:
-    """Return a mask of the ratios that a sensor can have, of reading to true value or of true value to reading."""
+    """Return a mask of the plausible ratios of a sensor's reading to the true value: those between 1/4 and 4."""
     ratios = np.asarray(ratio, dtype=np.float64)
     return (ratios < MAX_SCALE_RATIO) & (ratios > 1 / MAX_SCALE_RATIO)
 
 
 def wrong_unit(what: str, ratio: float, confusions: Sequence[tuple[float, str]]) -> Fault:
-    """Return the error `wrong_unit` for a `ratio`; it names the one of `confusions` that explains the ratio, if any."""
+    """Return the Fault `wrong_unit` for the `ratio` of reading to true value, with the likely one of `confusions`."""
     likely = (guess for confused, guess in confusions if 0.7 < ratio / confused < 1.4)
     return Fault(
         "wrong_unit",
@@ -225,7 +228,10 @@ def check_rotations(attitudes: Array) -> None:
 
 
 def check_side(reference: Array, side: Array) -> None:
-    """Raise Fault `sign_unknown` if `side` (3,) is nearly perpendicular to the `reference`, whose sign it must show."""
+    """Raise Fault `sign_unknown` if `side` (3,) is nearly perpendicular to `reference` (3,).
+
+    The readings determine `reference` except for its sign; the sign is chosen so that it points towards `side`.
+    """
     if abs(reference @ side) < MIN_SIDE_COSINE * np.linalg.norm(reference) * np.linalg.norm(side):
         direction = ", ".join(f"{part:.2f}" for part in (reference / np.linalg.norm(reference)).tolist())
         raise Fault(
@@ -249,7 +255,7 @@ def check_handedness(matrix: Array) -> None:
 
 
 def untrustworthy_attitudes(what: str, remedy: str = "") -> Fault:
-    """Return the error for attitudes that the readings contradict, with remedies besides checking the attitudes."""
+    """Return the Fault for attitudes that the readings contradict; `remedy` is added to the advice to check them."""
     return Fault(
         "attitude_untrustworthy",
         what,
@@ -259,7 +265,7 @@ def untrustworthy_attitudes(what: str, remedy: str = "") -> Fault:
 
 
 def report_inverted() -> Fault:
-    """Return the error for inverted attitudes, that is, attitudes whose inverses agree with the readings."""
+    """Return the Fault for inverted attitudes, that is, attitudes whose inverses agree with the readings."""
     return Fault(
         "inverted_attitudes",
         "the readings contradict the attitudes and agree with their inverses",
@@ -268,7 +274,7 @@ def report_inverted() -> Fault:
 
 
 def report_scalar_last() -> Fault:
-    """Return the error for quaternions whose scalar part was last in the file, and was read as if it were first."""
+    """Return the Fault for quaternions whose scalar part is the last number in the file but was read as the first."""
     return Fault(
         "inverted_attitudes",
         "the readings contradict the attitudes and agree with quaternions in the order x y z w: qw holds x, qx y, qy z "
@@ -279,7 +285,7 @@ def report_scalar_last() -> Fault:
 
 @contextmanager
 def convergence_required() -> Iterator[None]:
-    """Raise Fault `attitude_untrustworthy` if the block, a fit in attitudes, fails numerically."""
+    """Run a block that fits attitudes; raise Fault `attitude_untrustworthy` if it fails numerically."""
     try:
         yield
     except np.linalg.LinAlgError:
@@ -288,7 +294,7 @@ def convergence_required() -> Iterator[None]:
 
 @dataclass(frozen=True, slots=True)
 class Conditioning:
-    """Rank, and condition number: the largest over the smallest of the needed singular values."""
+    """The rank of a design, and its condition number: the largest over the smallest of the needed singular values."""
 
     rank: int
     condition: float
@@ -321,7 +327,10 @@ def check_conditioning(conditioned: Conditioning, needed: int, limit: float, wha
 
 
 def warn_of_residuals(residuals: Array, variances: Array, dof: int) -> tuple[str, ...]:
-    """Return a warning if residuals exceed their variances; `dof` is the fit's residual degrees of freedom."""
+    """Return a warning if residuals are much larger than their `variances` explain, else an empty tuple.
+
+    `dof` is the fit's residual degrees of freedom.
+    """
     if dof <= 0:
         return ()
     ratio = math.sqrt(float(np.sum(residuals**2 / variances)) / dof)

@@ -34,7 +34,7 @@ def residual_std_rad_s(explained: VectorFit) -> Array:
 
 
 def dwell_residual_std_m_s2(solution: "ImuSolution", movement: "Movement") -> Array:
-    """Return the standard deviations (N, 3) of the residuals of dwells, for an accelerometer's solution."""
+    """Return the standard deviations (N, 3) of the residuals that an accelerometer's solution has in N dwells."""
     from rig.estimation.reference import accelerometer_model
     from rig.estimation.reference.reading_errors import noise
 
@@ -48,7 +48,10 @@ def dwell_residual_std_m_s2(solution: "ImuSolution", movement: "Movement") -> Ar
 
 
 def attitude_residual_std(solution: "TriaxialSolution", inputs: "Dwells") -> Array:
-    """Return the standard deviations (N, 3) of residuals in attitudes without sweeps, in the readings' unit."""
+    """Return the standard deviations (N, 3) of a solution's residuals in N dwells, in the readings' unit.
+
+    The solution is one from dwells alone, without sweeps.
+    """
     from rig.estimation.reference import attitude_error, reference_model
     from rig.estimation.reference.reference_budget import response_in_attitudes
 

@@ -41,7 +41,7 @@ class SensorAxes:
 
     @property
     def to_angles(self) -> Array:
-        """The derivative (6, 9) of non-orthogonality and mounting with respect to the sensor's matrix, row by row."""
+        """The derivative (6, 9) of non-orthogonality and mounting; see `angle_jacobian`."""
         return angle_jacobian(self.axes, self.scale, self.mounting)
 
     @property
@@ -51,7 +51,7 @@ class SensorAxes:
         return matrix
 
     def angles_covariance_rad2(self, of_matrix: Array) -> Array:
-        """Return the covariance (6, 6) of non-orthogonality and mounting, from `of_matrix` (9, 9), that of F."""
+        """Return the covariance (6, 6) of non-orthogonality and mounting, from `of_matrix` (9, 9), F's, row by row."""
         to_angles = self.to_angles
         covariance: Array = to_angles @ of_matrix @ to_angles.T
         return covariance
@@ -76,9 +76,9 @@ def nearest_rotation(axes: Array) -> Array:
 
 
 def parameter_jacobian(matrix: Array, scale: Array) -> Array:
-    """Return the derivative (6, 12) of scale and bias with respect to `matrix` F, row by row, and to the offset.
+    """Return the derivative (6, 12) of scale and bias with respect to the elements of F, row by row, and the offset.
 
-    The offset is the bias with the opposite sign. The scale factor k = 1/‖F_i‖ of axis i changes by δk = −k³ F_i·δF_i.
+    The bias is minus the offset. The scale factor k = 1/‖F_i‖ of axis i changes by δk = −k³ F_i·δF_i.
     """
     jacobian = np.zeros((6, 12))
     jacobian[:3, :9].reshape(3, 3, 3)[PAIR_INDICES, PAIR_INDICES] = -(scale**3)[:, None] * matrix
@@ -87,11 +87,11 @@ def parameter_jacobian(matrix: Array, scale: Array) -> Array:
 
 
 def angle_jacobian(axes: Array, scale: Array, rotation: Array) -> Array:
-    """Return the derivative (6, 9) of non-orthogonality and mounting `rotation` with respect to the matrix F, by rows.
+    """Return the derivative (6, 9) of three non-orthogonalities and of the mounting with respect to F, row by row.
 
-    A row a_i of the axes A, with scale factor k_i, changes by δa_i = P_i δF_i with P_i = k_i (I − a_i a_iᵀ). The
-    non-orthogonality arcsin(a_i·a_j) changes by (a_j·δa_i + a_i·δa_j) / √(1 − (a_i·a_j)²). The mounting R of A = S R
-    changes by δR = [δθ]× R, in which (I tr S − S) δθ is the axial vector of M − Mᵀ with M = δA Rᵀ.
+    A row a_i of the axes A changes by δa_i = k_i (I − a_i a_iᵀ) δF_i. The mounting is the factor R of A = S R. It
+    changes by a small rotation δθ, so that δR = [δθ]× R, and (I tr S − S) δθ is the axial vector of M − Mᵀ with
+    M = δA Rᵀ.
     """
     project = scale[:, None, None] * (IDENTITY - axes[:, :, None] * axes[:, None, :])
     stretch = axes @ rotation.T

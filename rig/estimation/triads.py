@@ -33,7 +33,7 @@ def align_triads(
     gyroscope_covariance: ArrayLike,
     accelerometer_covariance: ArrayLike,
 ) -> Alignment:
-    """Return the alignment of two triads from their matrices F (3, 3) and the covariances (9, 9) of these, by rows.
+    """Return the alignment of two triads from their matrices F (3, 3) and the covariances (9, 9) of F, row by row.
 
     The triads' errors are treated as independent, so shared errors of the arm count twice. Raise Fault `not_finite`,
     `mirrored_axis`; ValueError for a wrong shape.

@@ -46,7 +46,7 @@ UNREDUCED_STDS = ("of_angle", "walk_rad_s_sqrt_s")  # these errors exist even if
 
 @dataclass(frozen=True, slots=True)
 class GraphFit:
-    """The converged graph, the unknowns' `covariance` (p, p), and `chi_square` with `dof`, both without the priors."""
+    """The converged graph, and the `covariance` (p, p) of its unknowns; `chi_square` and `dof` omit the priors."""
 
     session: HandRecording
     conditions: SessionConditions
@@ -102,7 +102,7 @@ _REMEDY = "See that each move is between two rests on the table, that no reading
 def _start(integrals: MoveIntegrals, faces: RestFaces, initial: GyroscopeModel) -> GraphState:
     """Return initial values of the unknowns.
 
-    The attitude at each rest is the one before, turned by the move, and tilted so that the face of that rest is up.
+    The attitude at each rest is that of the previous rest, turned by the move, then tilted until the face is up.
     """
     attitudes = [_align_vertical(np.eye(3), faces.up[0])]
     for row, rotation in enumerate(integrals.rotations):

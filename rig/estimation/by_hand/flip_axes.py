@@ -18,10 +18,11 @@ MAX_RATE_RAD_S = 150.0  # no gyroscope of this kind reads as much: the unit is d
 
 
 def check_axes(session: HandRecording) -> None:
-    """Raise Fault `wrong_unit`, `mirrored_axis`, `swapped_axes` or `wrong_mounting` if quarter turns show this error.
+    """Check the gyroscope's unit and, by quarter turns, its axes against the accelerometer's.
 
-    If no single map from the accelerometer's axes to the gyroscope's explains all quarter turns, nothing is raised,
-    because rests were then missed, so that several moves look like one.
+    If no single map from the accelerometer's axes to the gyroscope's explains all quarter turns, nothing is raised:
+    rests were probably missed, so that several moves look like one. Raise Fault `wrong_unit`, `mirrored_axis`,
+    `swapped_axes`, `wrong_mounting`.
     """
     if max((move.peak_rad_s for move in session.moves), default=0.0) > MAX_RATE_RAD_S:
         raise Fault("wrong_unit", "the readings look like degrees per second given as rad/s", "Give them in rad/s")
@@ -66,7 +67,7 @@ def _check_turned(unit: Array) -> None:
 
 
 def _quarters(session: HandRecording) -> tuple[Array, Array]:
-    """Return the rotation vectors (k, 3) of quarter turns as measured by the accelerometer, and by the gyroscope."""
+    """Return the rotation vectors of k quarter turns: (k, 3) by the accelerometer, and (k, 3) by the gyroscope."""
     about = []
     swept = []
     for row, move in enumerate(session.moves):

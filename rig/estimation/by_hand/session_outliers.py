@@ -140,7 +140,7 @@ def _fault_columns(fit: GraphFit, name: str, index: int) -> Array:
 
 
 def _tilt_columns(fit: GraphFit, row: Factor, index: int) -> Array:
-    """Return the changes (r, 2) of a factor's equations if the table is tilted before rest `index` and remains tilted.
+    """Return the derivatives (r, 2) of a factor's equations by a tilt of the table before rest `index` that remains.
 
     The changes are zero for the move to the last rest, where a tilted table looks like a body that does not lie flat.
     """

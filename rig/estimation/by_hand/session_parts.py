@@ -16,9 +16,10 @@ FACES = ("+x", "-x", "+y", "-y", "+z", "-z")
 
 @dataclass(frozen=True, slots=True)
 class HandRest:
-    """A rest from `start_s` to `end_s`: mean (3,) of `samples` readings and their standard deviation (3,).
+    """A rest from `start_s` to `end_s`, with `samples` readings of the gyroscope.
 
-    `acceleration_m_s2` and `acceleration_noise_m_s2` are the same for an accelerometer's readings, None without one.
+    `mean_rad_s` and `noise_rad_s` (3,) are the readings' mean and standard deviation. `acceleration_m_s2` and
+    `acceleration_noise_m_s2` (3,) are those of an accelerometer's readings, None without an accelerometer.
     """
 
     start_s: float
@@ -93,10 +94,11 @@ class SessionConditions:
 class HandStds:
     """Standard deviations of a hand's errors, and of a sensor's errors outside the model.
 
-    - `repeat_rad`: of the attitude when a face is laid down again; `closure_rad`: of the heading after a whole turn.
-    - `of_angle`: of the rotation about each axis in a quarter turn, as a fraction of the angle.
-    - `walk_rad_s_sqrt_s`: of the bias from rest to rest.
-    - `acceleration_m_s2`: of an accelerometer's reading at rest, across the vertical.
+    - `repeat_rad`: scatter of the attitude when a face is laid down again.
+    - `closure_rad`: error of the heading after a whole turn.
+    - `of_angle`: error of the rotation about each axis in a quarter turn, as a fraction of the angle.
+    - `walk_rad_s_sqrt_s`: random walk of the bias from rest to rest.
+    - `acceleration_m_s2`: error of an accelerometer's reading at rest, across the vertical.
     """
 
     repeat_rad: float = 3e-4

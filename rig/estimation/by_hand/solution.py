@@ -46,7 +46,7 @@ CONTRIBUTORS: dict[str, tuple[Literal["A", "B"], tuple[str, ...], str]] = {
 
 @dataclass(frozen=True, slots=True)
 class RestSummary:
-    """A rest on a `face`, None if unknown; `normalised_residual`: the largest residual in units of its own std."""
+    """The fit of a rest: its largest residual in units of that residual's std, and its `face`, None if unknown."""
 
     face: str | None
     normalised_residual: float
@@ -54,9 +54,12 @@ class RestSummary:
 
 @dataclass(frozen=True, slots=True)
 class MoveSummary:
-    """A move of the `kind` by `angle_rad`; `turns`: the number of whole turns, 0 for a flip.
+    """The fit of a move by the angle `angle_rad`.
 
-    `closure_rad`: the error of the heading after whole turns, None if the model has no such error for the move.
+    - `kind`: a "turn" has whole turns, a "flip" none; a move is "omitted" if its rotation was not measured.
+    - `turns`: the signed number of whole turns.
+    - `normalised_residual`: the largest residual in units of its own standard deviation.
+    - `closure_rad`: the error of the heading after whole turns, None if the model has no such error for the move.
     """
 
     kind: Literal["flip", "turn", "omitted"]
@@ -70,8 +73,8 @@ class MoveSummary:
 class HandSolution:
     """The solution of a session by hand.
 
-    - `turned`: scale, bias and axes, in the type that the solution from known rotations has too.
-    - `stds`: standard deviations of the hand by name: estimated, stated, and largest allowed.
+    - `turned`: scale, bias and axes, of the same type as a solution from known rotations.
+    - `stds`: three values of each standard deviation of `HandStds`, by name: estimated, stated, and largest allowed.
     - `creeping_s`: times at which the body crept during intended rests, which are left out.
     - `expanded_scale` (3,): U (k = 2) from this session and its clock. The budget of `turned` has one contributor more,
       which is estimated from recordings of real hands.
@@ -147,7 +150,7 @@ def _check_session(session: HandRecording) -> None:
 
 
 def summarise_fit(fit: GraphFit, warnings: tuple[str, ...] = ()) -> HandSolution:
-    """Return the solution of a converged graph, with further warnings."""
+    """Return the solution of a converged graph; `warnings` are added to its own."""
     matrix, conditions = fit.state.matrix, fit.conditions
     axes = SensorAxes.from_matrix(matrix)
     chosen = parameter_columns(fit)
@@ -201,7 +204,10 @@ def parameter_columns(fit: GraphFit) -> NDArray[np.intp]:
 
 
 def insufficient_session(session: HandRecording, expanded: Array | None) -> Fault:
-    """Return the Fault of a session that has no result because its moves are unusable or too few."""
+    """Return the Fault of a session that has no result because its moves are unusable or too few.
+
+    `expanded` (3,) is the relative U of the scale factors so far, None if unknown.
+    """
     clipped = sum(move.clipped for move in session.moves)
     lost = sum(move.lost for move in session.moves)
     if clipped:

@@ -55,7 +55,10 @@ class Identifiability:
 
 @dataclass(frozen=True, slots=True)
 class ExpectedStds:
-    """Standard deviations by Cramér–Rao, RMS of three axes: relative scale, angle between axes, bias, nonlinearity."""
+    """The smallest possible standard deviations (Cramér–Rao) of an accelerometer's parameters, each RMS of three axes.
+
+    `scale_std` is relative; `second_order_std_s2_m`, of the nonlinearity, is None for `order` 1.
+    """
 
     scale_std: float
     non_orthogonality_std_rad: float
@@ -80,9 +83,9 @@ def assess_identifiability(attitudes: Array, up: Array, order: Order = 1) -> Ide
 def g_efficiency(attitudes: Array, up: Array, order: Order = 1) -> float:
     """Return the G-efficiency: the number of parameters over the worst prediction variance; 1 at best, 0 if singular.
 
-    The attitudes are exact and all readings have the same noise. The prediction variance of any orientation is N times
-    the trace of the predicted reading's covariance (3, 3), in units of one reading's variance. Its mean over the
-    design's own attitudes is the number of parameters (Kiefer and Wolfowitz).
+    The attitudes count as exact, and all readings as equally noisy. The prediction variance of any orientation is N
+    times the trace of the predicted reading's covariance (3, 3), in units of one reading's variance. Its mean over the
+    design's own N attitudes is the number of parameters (Kiefer and Wolfowitz).
     """
     from scipy.optimize import minimize
     from scipy.spatial.transform import Rotation
@@ -110,9 +113,10 @@ def g_efficiency(attitudes: Array, up: Array, order: Order = 1) -> float:
 def predict_stds(
     attitudes: Array, reference_m_s2: Array, noise_m_s2: Array, attitude_std_rad: float, order: Order = 1
 ) -> ExpectedStds:
-    """Return the Cramér–Rao bound for mean readings with noise of std `noise_m_s2` (N,) and errors of the attitudes.
+    """Return the smallest possible standard deviations of a calibration from mean readings in N attitudes.
 
-    `reference_m_s2` (3,): the specific force at rest, in table coordinates. The attitudes must determine all
+    The readings have noise of std `noise_m_s2` (N,), the attitudes errors of std `attitude_std_rad` about each axis.
+    `reference_m_s2` (3,) is the specific force at rest, in table coordinates. The attitudes must determine all
     parameters, see `assess_identifiability`.
     """
     theta, count = _ideal(reference_m_s2, order), len(attitudes)

@@ -58,9 +58,10 @@ MIN_STD_RATIO = 1e-3  # to the usual std, for a sample that is stated to be exac
 class Fixes:
     """A reference's attitudes: k samples, grouped into N fixes.
 
-    - `at_s` (k,): increasing times; `attitudes` (k, 3, 3): body to table; `fix` (k,): the index of its fix.
-    - `placement` (N,): a number for each fix: negative at rest, the same for both fixes of one rest, which share one
-      error because the body lay still; in motion a different number for each fix, at least 0.
+    - `at_s` (k,): the samples' increasing times; `attitudes` (k, 3, 3): body to table.
+    - `fix` (k,): the index of the fix to which each sample belongs.
+    - `placement` (N,): a number for each fix. Fixes in one rest have the same negative number, because the body lay
+      still and they share one error. In motion each fix has a different number, at least 0.
     - `joined` (N − 1,): True if the gyroscope's readings are complete from one fix to the next.
     - `std_rad` (k,): the stated standard deviation of each sample, None if none is stated.
     - `blind_rad` (N − 1,): standard deviation of the rotation that missing readings hide, None if none are missing.
@@ -301,7 +302,7 @@ def correlate_effects(effects: Array, correlation: Array) -> Array:
 
 
 def _find_matrix_changes(sensitivities: Array, nearby: Array) -> Array:
-    """Return the covariance (3n, 3n) of n increments if the elements of the matrix F vary with attitude by one unit.
+    """Return the covariance (3n, 3n) of n increments if each element of F varies with attitude, with unit variance.
 
     `nearby` (n, n) is the correlation between the increments. Causes of such a variation are the sensor's nonlinearity,
     its sensitivity to gravity, and gears in the reference.
@@ -336,7 +337,7 @@ def _find_bias_changes(sensitivities: Array, nearby: Array, middles_s: Array, we
 
 
 def _expand_axes(covariance: Array) -> Array:
-    """Return the covariance (3n, 3n) of n vectors whose x components have `covariance` (n, n), as y and z have too."""
+    """Return the covariance (3n, 3n) of n vectors; x, y and z are independent, and each has `covariance` (n, n)."""
     return np.asarray(np.kron(covariance, np.eye(3)), dtype=np.float64)
 
 

@@ -90,7 +90,8 @@ class IncrementSolution:
     - covariance (15, 15): of the matrix row by row, the Earth's rate, and the bias, in this order.
     - causes: parts (15, 15) of the covariance, by name.
     - earth: the Earth's rate from the increments, or the Fault that says why it is not determined.
-    - clock_s, clock_std_s: the reference's attitude with the time stamp t belongs to the readings' time t + `clock_s`.
+    - clock_s: the reference's attitude with the time stamp t belongs to the readings' time t + `clock_s`; clock_std_s:
+      its standard deviation.
     - fix_std_rad: standard deviation of a fix about each axis.
     - random_walk_rad_sqrt_s: random walk of the gyroscope's angle.
     - matrix_scatter, bias_scatter_rad_s: standard deviation of each element between intervals of the recording.

@@ -31,8 +31,8 @@ UNKNOWN_ATTITUDE_STD_RAD = 1.0
 class PlacementSolution:
     """The parameters `theta` (p,), estimated with placement errors; their covariance is the sum of named `causes`.
 
-    `placement_std` is the std of the placement errors in the unit of the readings, with its `placement_uncertainty`;
-    `attitude_error` is that of the attitudes.
+    `placement_std` is the std ζ of the errors η in the unit of the readings, `placement_uncertainty` the standard
+    uncertainty of this std. `attitude_error` states the std δ of the rotations ε, and the uncertainty of that.
     """
 
     theta: Array
@@ -101,7 +101,8 @@ class _LinearisedPlacements:
 class _PlacementFits:
     """The fits for k sizes of the placement errors.
 
-    `steps` (k, q) of the parameters, their covariances (k, q, q) by the `causes`, and the log-likelihoods (k,).
+    `steps` (k, q) are the parameters' changes. `causes` are parts (k, q, q) of the steps' covariances, by name;
+    `likelihood` (k,) is the logarithm of the restricted likelihood.
     """
 
     steps: Array
@@ -110,7 +111,10 @@ class _PlacementFits:
 
 
 def laid_down(theta: Array, placed: AttitudeReadings, unplaced: Array, unplaced_variances: Array) -> PlacementSolution:
-    """Return a new fit from `theta` (p,), with placement errors; `unplaced` (k, 3) are readings without attitudes."""
+    """Return the solution with placement errors, one step from the solution `theta` (p,) without them.
+
+    `unplaced` (k, 3) are readings in unknown attitudes.
+    """
     all_rests = _add_unplaced(theta, placed, unplaced, unplaced_variances)
     free = free_directions(theta, norm_known=all_rests.norm_known)
     linear = _LinearisedPlacements(

@@ -260,7 +260,7 @@ def _find_noise_dof(explained: VectorFit) -> float:
 
 
 def evaluate_a(name: str, source: str, covariance: Array, dof: float = np.inf) -> Contributor:
-    """Return a contributor that was estimated from the readings."""
+    """Return a contributor of type A, that is, estimated from the readings."""
     return Contributor(name, "A", "normal", None, "", source, dof, covariance)
 
 
@@ -293,7 +293,10 @@ def split_bias_covariance(bias: BiasProcess, response: Array, windows_s: Array) 
 
 
 def _tilt_axes(inputs: VectorInputs, angle_rad: float) -> Array:
-    """Return the errors (2 J, N, 3) of the rates if the axis of each of J joints is tilted in two directions."""
+    """Return the errors (2 J, N, 3) of the rates if each of J joints' axes is tilted by `angle_rad`.
+
+    Each axis has two errors: tilts about two directions perpendicular to the axis.
+    """
     patterns: list[Array] = []
     for joint in sorted(set(inputs.joints) - {None}, key=str):
         swept = np.array([name == joint for name in inputs.joints])

@@ -36,8 +36,8 @@ MAX_ITERATIONS = 2  # B depends on F, and the first F is already within one perc
 class CommonErrors:
     """The best linear unbiased prediction of P errors that are common to N mean readings.
 
-    `sizes` (P,) are in prior standard deviations, with the posterior `covariance` (P, P); `readings_rad_s` (N, 3) are
-    the effects of the errors on the mean readings.
+    `sizes` (P,) are the predicted errors, each in units of its prior standard deviation, and `covariance` (P, P) is
+    their posterior covariance. `readings_rad_s` (N, 3) is the predicted errors' effect on the mean readings.
     """
 
     sizes: Array
@@ -47,7 +47,7 @@ class CommonErrors:
 
 @dataclass(frozen=True, slots=True)
 class Prediction:
-    """The common errors, predicted with the last estimate of the gyroscope's matrix, and arrays for their use.
+    """The predicted `errors`, and arrays that depend on the gyroscope's matrix, as last estimated.
 
     - `patterns_rad_s` (P, N, 3): the effect of one standard deviation of each error on the readings.
     - `gain` (P, N, 3): the map from the means to the sizes of the errors.
@@ -109,8 +109,9 @@ class CommonErrorModel:
     def solve(self, shared_covariance_rad2_s2: Array | None = None) -> tuple[VectorSolution, CommonErrors]:
         """Return the solution corrected for common errors, and the estimated errors.
 
-        `covariance`, `matrix_covariance` and `response` of the solution are due to the readings alone;
-        `angles_covariance_rad2` includes the common errors that remain. Raise Fault as `solve_vector_model` does.
+        The solution's `covariance`, `matrix_covariance` and `response` are due to the readings alone. Its
+        `angles_covariance_rad2` also includes the undetermined part of the common errors. Raise Fault as
+        `solve_vector_model` does.
         """
         prediction = self.predict(shared_covariance_rad2_s2)
         solution = solve_vector_model(

@@ -9,8 +9,8 @@ estimated: F, c and ω_E.
 
 e contains the errors of the arm's angles, as in `vector_fit.explain`, and of its repeatability, which tilts the axis of
 each sweep independently. A tilt of a hundred microradians at 1 rad/s causes an error of 20 °/h across the axis, and an
-error in a revolution's end time changes the speed along the axis. So sweeps contribute little more than the bias, and
-the rests in many attitudes determine the Earth's rate.
+error in a revolution's end time changes the speed along the axis. So sweeps help mainly by determining the bias; the
+Earth's rate is determined by the rests in many attitudes.
 
 Gravity and the Earth's axis are both fixed in the room. A g-sensitivity G = λ F has the same effect as an Earth's rate
 along the vertical, so one of them must be given: G, which is zero for an optical gyroscope, or the vertical component
@@ -174,7 +174,10 @@ class _EarthRateFit:
 def _fit(
     inputs: VectorInputs, mounting: Array, directions: Array, gravity: Array | None, prior: EarthRatePrior
 ) -> _EarthRateFit:
-    """Return the fit of the vector model with common errors, of which the last are the Earth's rate by `directions`."""
+    """Return the fit of the vector model with common errors.
+
+    The last d of these errors are the components of the Earth's rate along `directions` (d, 3).
+    """
     speeds = np.linalg.norm(inputs.turns_rad_s, axis=1)
     durations = np.diff(inputs.windows_s).T[0]
     by_states = np.sqrt(2) * prior.state_jitter_s * inputs.state_gains / durations * speeds  # at both ends
@@ -205,7 +208,7 @@ def _fit(
 
 
 def _extract_earth_rate(fit: _EarthRateFit, directions: int) -> tuple[Array, Array]:
-    """Return the Earth's rate along the directions (d,), and its covariance (d, d)."""
+    """Return the components (d,) of the Earth's rate along d `directions`, and their covariance (d, d)."""
     sizes, covariance = fit.errors.sizes[-directions:], fit.errors.covariance[-directions:, -directions:]
     return PRIOR_STD_RAD_S * sizes, PRIOR_STD_RAD_S**2 * covariance
 

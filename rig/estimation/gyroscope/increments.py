@@ -100,7 +100,10 @@ def integrate_attitudes(time_s: Array, readings: Array, matrix: Array, bias: Arr
 
 
 def track(time_s: Array, readings: Array, matrix: Array) -> Track:
-    """Integrate readings that have no bias, and return the attitudes at their own times; see `integrate_attitudes`."""
+    """Return the attitudes at the times of the readings (n, 3), which are integrated as if they had no bias.
+
+    `integrate_attitudes` states the units and what it raises.
+    """
     inverse = np.asarray(np.linalg.inv(matrix), dtype=np.float64)
     interval = _find_slopes(time_s, readings @ inverse.T)
     steps = _whole_steps(interval)
@@ -187,7 +190,7 @@ class _IncrementSteps:
         return np.asarray(-_matrices(self.vectors / 2) @ inverse, dtype=np.float64)
 
     def sensitivities(self, attitudes: Array, inverse: Array) -> Array:
-        """Return what each step adds to S (k, 3, 12), the derivatives of the attitude by F and the offset.
+        """Return the increase (k, 3, 12) of S in each step; S is that of `IntegratedAttitudes`.
 
         The steps start at `attitudes` (k, 3, 3); `inverse` (3, 3) is F⁻¹.
         """

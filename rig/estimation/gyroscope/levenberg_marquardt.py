@@ -46,9 +46,9 @@ def solve_levenberg_marquardt(
     speed_std_rad_s: ArrayLike | None = None,
     weighted: bool = True,
 ) -> LevenbergMarquardtSolution:
-    """Return the solution of `scipy.optimize.least_squares(method="lm")` with the exact Jacobian.
+    """Return the six-observation solution by `scipy.optimize.least_squares(method="lm")` with the exact Jacobian.
 
-    The start has unit scale factors, and the negative mean of the readings as bias.
+    The search begins at unit scale factors and, as the bias, the negative mean of the readings.
 
     `means_rad_s`, `variances_rad2_s2` (N, 3): mean readings of N ≥ 6 sweeps and the variances of these means;
     `speeds_rad_s`, `speed_std_rad_s` (N,). If `weighted`, the weights are the inverse variances of the residuals for

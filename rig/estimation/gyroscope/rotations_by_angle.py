@@ -6,7 +6,8 @@ The rate during a rotation does not matter, so a hand may turn the gyroscope. Th
     Log(exp(n α) R(F, c)ᵀ) = J δθ + e
 
 R is the body's rotation, integrated from the gyroscope's readings m = F ω + c, n the axis in the body's frame, α the
-angle. e contains the end attitude's error about all three axes, the effect of a tilted axis, and the gyroscope's noise.
+angle, δθ the error of F and c, and J the derivative by these. e contains the end attitude's error about all three
+axes, the effect of a tilted axis, and the gyroscope's noise.
 A whole revolution determines nᵀ F n alone; the mean reading determines the components across n, if the axis is fixed in
 the body:
 
@@ -62,7 +63,7 @@ class RateMean:
 
 @dataclass(frozen=True, slots=True)
 class Gyroscope:
-    """All readings (n, 3) in rad/s at times (n,), the angle random walk, and the bias's std (3,) from rest to rest."""
+    """All readings (n, 3) in rad/s at times (n,), the angle random walk, and the std (3,) of the bias between rests."""
 
     time_s: Array
     readings: Array
@@ -74,7 +75,7 @@ class Gyroscope:
 class TurnedSolution:
     """A solution with the fields of `vector_model.VectorSolution`; `budget` divides its covariance by cause.
 
-    - `residuals_rad_s` (N, 3): of the means, then of the rotations as mean rates.
+    - `residuals_rad_s` (N, 3): first those of the means, then those of the rotations, expressed as mean rates.
     - `inflation`: the Birge ratio of the rotations, at least 1, with `inflation_dof` degrees of freedom.
     - `estimator`: the name of the method, "increments" or "by_hand".
     """

@@ -95,7 +95,10 @@ def _propagate_speeds(inputs: VectorInputs, matrix: Array) -> Array:
 
 
 def _tilt_axes(sensed: Array, scale: Array, angle_rad: float) -> Array:
-    """Return the effects (3, N, 3) of tilts of y to x, z to x, and z to y on the readings of `sensed` rates (N, 3)."""
+    """Return the effects (3, N, 3), on readings, of three tilts of sensor axes by `angle_rad` at `sensed` rates (N, 3).
+
+    The tilts are that of y towards x, of z towards x, and of z towards y.
+    """
     patterns = np.zeros((3, *sensed.shape))
     for row, (tilted, towards) in enumerate(((1, 0), (2, 0), (2, 1))):
         patterns[row, :, tilted] = angle_rad * sensed[:, towards] / scale[tilted]

@@ -32,7 +32,8 @@ class StatedMotion:
     - `rates_rad_s` (N, 3): the stated rates, zero for a rest.
     - `variances_rad2_s2` (N, 3): the variances of the means due to noise.
     - `rate_patterns` (N, 3): the effects on the readings of a relative rate error of 1.
-    - `axis_patterns` (2, N, 3): the effects of axes tilted by 1 rad about either direction across the axis.
+    - `axis_patterns` (2, N, 3): the effects on the readings of an axis that is tilted by 1 rad, about each of two
+      directions perpendicular to the axis.
     """
 
     residuals_rad_s: Array
@@ -79,10 +80,10 @@ class MotionErrors:
         return _median(self.rate**2, self.weights), _median(self.axis_rad**2, self.weights)
 
     def expanded(self, fixed: Array, of_rate: Array, of_axis: Array) -> Array:
-        """Return the expanded uncertainties U (q,), at 95.45 %, of q values, for the pairs of stds by their weights.
+        """Return the expanded uncertainties U (q,), at 95.45 %, of q values with normal distributions.
 
-        For a given pair the values have a normal distribution. `fixed` (q,) are the variances that do not depend on the
-        pair, `of_rate` and `of_axis` (q,) the variances for `rate` = 1 and `axis_rad` = 1.
+        The probability is averaged over the pairs of standard deviations with their `weights`. `fixed` (q,) are the
+        variances that do not depend on the pair, `of_rate` and `of_axis` (q,) those for `rate` = 1 and `axis_rad` = 1.
         """
         from scipy.special import ndtr
 
@@ -99,7 +100,7 @@ class MotionErrors:
 
 
 def motion_errors(motion: StatedMotion) -> MotionErrors:
-    """Return the posterior distribution of the stated motion's errors, from the residuals of sweeps and rests."""
+    """Return the posterior distribution of the stds ρ and α, from the residuals of sweeps and rests."""
     smallest = min(MIN_NOISE_RATIO * motion.relative_noise, MAX_ERROR / 10)
     sizes = np.geomspace(smallest, MAX_ERROR, GRID_POINTS)
     prior = -np.log(np.maximum(sizes / PRIOR_KNEE_ERROR, 1.0))

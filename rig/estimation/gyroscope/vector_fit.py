@@ -43,8 +43,8 @@ class VectorInputs:
     - arms_m (N, 3): lever arms from the rotation axis to the sensor in the flange frame, None to neglect them.
     - noise_dof (N, 3): degrees of freedom of the variances.
     - sensor: the sensor's properties from the data sheet, None if unknown.
-    - encoder_errors_rad_s (P, N, 3): effect of one standard uncertainty of each encoder error at the ends of arcs; None
-      for whole revolutions.
+    - encoder_errors_rad_s (P, N, 3): effect of one standard uncertainty of each encoder error at the ends of arcs on
+      the rates; None for whole revolutions.
     - ripples (N,): RMS ripple of each rotation as a fraction of its rate.
     - state_gains (N,): ratio of the noise that the arm's states cause in the mean rate to the noise that they cause in
       Δθ/T, a joint's travel over the duration.

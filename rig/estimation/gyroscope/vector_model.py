@@ -188,7 +188,8 @@ def fit_coefficients(
 ) -> tuple[Array, Array, Array | None]:
     """Return coefficients, their map from the means (see `regress`), and the effect (N, 3) of the speeds' errors.
 
-    The weights include this effect. The effect is None if all speeds are exact.
+    The effect is the change of the readings by one standard deviation of each speed, None if all speeds are exact. The
+    weights of the fit include it.
     """
     coefficients, inverse = regress(design, means, variances, shared)
     if not speed_std.any():
@@ -242,7 +243,7 @@ def design_matrix(rates: Array, gravity: Array | None) -> Array:
 
 
 def _unit(design: Array) -> Array:
-    """Return the divisor (p,) of each column, the RMS of the column's block: the rates, the ones, or gravity."""
+    """Return the RMS (p,) of the block to which each column belongs: the rates, the ones, or gravity."""
     squares = np.einsum("np,np->p", design, design).tolist()
     of_rates, of_gravity = ((sum(squares[block]) / len(design)) ** 0.5 or 1.0 for block in (slice(0, 3), slice(4, 7)))
     return np.array([*[of_rates] * 3, 1.0, *[of_gravity] * len(squares[4:])])
@@ -291,7 +292,10 @@ def _raw_covariance(inverse: Array, variances: Array, speed_noise: Array | None,
 
 @cache
 def index_coefficients(columns: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Return the indices of coefficients, `columns` for each axis: (12,) of F by rows and c, then those of G."""
+    """Return the indices (12,) of F, row by row, then c, and the indices of G, among all coefficients.
+
+    The coefficients are listed axis by axis; each axis has as many as the design has `columns`.
+    """
     index = np.arange(3 * columns, dtype=np.intp).reshape(3, columns)
     return np.concatenate([index[:, :3].ravel(), index[:, 3]]), index[:, 4:].ravel()
 

@@ -194,7 +194,10 @@ def _differentiate_lag(waves: Array, sweeps: Sweeps) -> Array:
 
 
 def project_lever_arm(delay_s: float, movement: Movement) -> Array:
-    """Return the matrices (K, 3, 3) that map a lever arm to its acceleration; a constant speed affects only means."""
+    """Return the matrices (K, 3, 3) that map a lever arm to the acceleration at its end, in dwells and sweeps.
+
+    The matrices are zero in dwells; if the joint turns evenly, also in the cosines and sines of sweeps.
+    """
     sweeps, now, change = movement.sweeps, slice(0, 2), slice(2, 4)
     turning = sweeps.turning_rad2_s2
     phase = (delay_s * sweeps.speeds_rad_s)[:, None, None]
@@ -202,9 +205,10 @@ def project_lever_arm(delay_s: float, movement: Movement) -> Array:
 
 
 def _around_axes(turning_rad2_s2: Array, movement: Movement) -> Array:
-    """Return the matrices (K, 3, 3) that map a lever arm to its acceleration, from ω² and α in sweeps (M, 2, 3).
+    """Return the matrices (K, 3, 3) that map a lever arm to the acceleration at its end.
 
-    ω is the angular rate and α the angular acceleration, given by their mean, cosine and sine over the joint's angle.
+    `turning_rad2_s2` (M, 2, 3) contains, for each sweep, the square ω² of the angular rate and the angular acceleration
+    α, each as mean, cosine and sine over the joint's angle.
     """
     axes = movement.sweeps.axes_flange
     centripetal, euler = axes[:, :, None] * axes[:, None, :] - np.eye(3), cross(axes)
@@ -214,7 +218,7 @@ def _around_axes(turning_rad2_s2: Array, movement: Movement) -> Array:
 
 
 def find_flange_force(delay_s: float, movement: Movement) -> Array:
-    """Return the specific force (K, 3), m/s², of the flange due to its distance from the axis and to other joints."""
+    """Return the specific force (K, 3), m/s², at the flange due to its lever arm and to the sway of other joints."""
     force: Array = (project_lever_arm(delay_s, movement) @ _arms(np.zeros(3), movement))[..., 0]
     force[len(movement.dwells.readings_m_s2) :] += movement.sweeps.swayed_m_s2.reshape(-1, 3)
     return force

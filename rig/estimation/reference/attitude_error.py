@@ -36,9 +36,9 @@ CONVERGED_CHANGE_RATIO = 1e-3  # of δ
 
 @dataclass(frozen=True, slots=True)
 class AttitudeError:
-    """The std of attitudes about each axis, rad, beyond their stated uncertainty; `uncertainty_rad` is its own std.
+    """The estimated std of attitudes about each axis, in addition to their stated uncertainty.
 
-    Near zero the likelihood is one-sided, and `uncertainty_rad` is the std towards larger values.
+    `uncertainty_rad` is the standard uncertainty of this estimate, towards larger values if the std is near zero.
     """
 
     std_rad: float
@@ -49,8 +49,8 @@ class AttitudeError:
 class AttitudeReadings:
     """Readings (N, 3) with the `variances` (N, 3) of their noise, in `attitudes` (N, 3, 3), body to table.
 
-    `v_bar` (N, 3) is the table's own motion; `attitude_std_rad` (N,) the stated uncertainty of each attitude, zero if
-    none; `norm_known`: True if the norm of the reference is given.
+    `v_bar` (N, 3) is the input due to the table's own motion, in body axes; `attitude_std_rad` (N,) is the stated
+    uncertainty of each attitude, zero if none is stated; `norm_known` is True if the norm of the reference is given.
     """
 
     readings: Array
@@ -108,9 +108,9 @@ def solve_attitude_weighted(start: Array, placed: AttitudeReadings) -> AttitudeW
 
 
 def find_worst_attitude(start: Array, placed: AttitudeReadings, fit: AttitudeWeighted) -> tuple[int, float, float]:
-    """Return the index of the attitude that fits worst, its error relative to the others, and the expected error, rad.
+    """Return the index of the attitude that fits worst, its error in rad, and the error in rad that is expected.
 
-    The expected error is determined without that attitude, which would inflate it.
+    Both errors follow from a fit to the other attitudes, because the worst one would distort the fit.
     """
     residuals = placed.readings - predicted(fit.theta, placed.attitudes, placed.v_bar)
     worst = int(np.argmax(np.sum(whitened(fit.whiteners, residuals) ** 2, axis=1)))
@@ -203,9 +203,10 @@ def maximise_likelihood(
 
 
 def _find_uncertainty(delta: float, fit: Array, rotations: Array) -> float:
-    """Return the std of the attitude error `delta` δ, from the expected information on δ².
+    """Return the standard uncertainty of the attitude error `delta` δ, from the expected information on δ².
 
-    The information is tr((P G)²)/2 with G = E Eᵀ, the effects E (`rotations`), and P, which maps readings to residuals.
+    The information is tr((P G)²)/2 with G = E Eᵀ. E are the effects (`rotations`) on whitened readings, and P maps
+    whitened readings to residuals.
     """
     orthogonal = np.linalg.qr(fit)[0].reshape(*rotations.shape[:2], -1)
     growth = rotations @ np.swapaxes(rotations, -1, -2)

@@ -172,7 +172,10 @@ def _check_attitudes(start: Array, movement: Movement, fixed: list[int], fit: Fi
 
 
 def _find_worst_dwell(start: Array, movement: Movement, fixed: list[int], fit: Fit) -> tuple[int, float, float]:
-    """Return the index of the dwell that fits worst, its error relative to the others, and the others' error, rad."""
+    """Return the index of the dwell that fits worst, and two errors in rad from a fit to all others.
+
+    The first is the error of that dwell's attitude, the second the standard deviation of the others.
+    """
     count = len(movement.dwells.readings_m_s2)
     residuals = (movement.readings() - predicted(fit.theta, movement))[:count]
     rotations = effects(fit.theta, movement)[: 3 * count].reshape(count, 3, -1)

@@ -36,7 +36,10 @@ def linear_start(movement: Movement, norm: float, up: Array) -> Array:
 
 
 def _linear(movement: Movement, readings: Array, norm: float, up: Array) -> Array:
-    """Return the parameters that solve linear equations in readings (K, 3) without the flange's acceleration."""
+    """Return the parameters (22,) from one linear solution, in which the flange's lever arm p counts as zero.
+
+    The effect of p must therefore be subtracted from the `readings` (K, 3) if it is not negligible.
+    """
     x = np.zeros((*readings.shape, LEVER.stop))
     for axis in range(3):
         x[:, axis, 3 * axis : 3 * axis + 3] = readings

@@ -39,8 +39,8 @@ def noise(theta: Array, movement: Movement) -> Array:
 def nonlinearity_patterns(theta: Array, movement: Movement) -> Array:
     """Return the effects (P, 3 K) on the readings of one standard uncertainty of each axis' nonlinearity.
 
-    The quadratic and the cubic nonlinearity of `accelerometer_errors` come separately; a nonlinearity without
-    uncertainty is left out.
+    The first three rows are for the quadratic, the next three for the cubic nonlinearity of `accelerometer_errors`.
+    Either three are left out if the nonlinearity has no effect or no uncertainty.
     """
     sensor = movement.sensor_errors
     if sensor is None:
@@ -55,7 +55,7 @@ def nonlinearity_patterns(theta: Array, movement: Movement) -> Array:
 def bias_warming(movement: Movement) -> Array:
     """Return the readings' errors (6, 3 K) due to one standard uncertainty of each bias's temperature coefficient.
 
-    Three are for the recorded temperature, three for changes smaller than a step of the thermometer.
+    Three rows are for the recorded temperature, three for changes smaller than a step of the thermometer.
     """
     sensor = movement.sensor_errors
     if sensor is None:
@@ -81,7 +81,7 @@ def scale_warming(theta: Array, movement: Movement) -> Array:
 
 
 def _warmer_k(sensor: AccelerometerErrors, movement: Movement) -> tuple[Array, Array]:
-    """Return each segment's recorded temperature deviation (K,) from the mean, and its rounding error (K,), kelvins."""
+    """Return the recorded temperature at K readings minus the mean (K,), and the part hidden by rounding (K,), in K."""
     return repeat_by_segment(sensor.warmer_k, movement), repeat_by_segment(sensor.unseen_k, movement)
 
 

@@ -214,7 +214,7 @@ def _check(m: Array, r: Array, v: Array, prior: ReferencePrior, parameters: int)
 
 
 def _check_size(m: Array, norm: float) -> None:
-    """Raise Fault `wrong_unit` if readings are smaller than the reference, or differ more than attitudes explain."""
+    """Raise Fault `wrong_unit` if readings (N, 3) are far smaller, or scatter far more, than the reference's `norm`."""
     size, spread = (float(np.sqrt(np.mean(np.sum(vectors**2, axis=1)))) for vectors in (m, m - m.mean(axis=0)))
     refusals.check_unit(np.full(3, norm / np.clip(norm, spread, size)), refusals.UNIT_RATIOS)
 
@@ -255,10 +255,10 @@ def _check_attitudes(start: Array, placed: AttitudeReadings, fit: AttitudeWeight
 
 
 def check_trustworthy(error_rad: float, furthest: Callable[[], tuple[int, float, float]], *, enough: bool) -> None:
-    """Raise Fault `attitude_untrustworthy` for large attitude errors: of all attitudes, or of the worst one.
+    """Raise Fault `attitude_untrustworthy` if the error of all attitudes, or of the worst one, is too large.
 
-    `error_rad` is the error of all. `furthest`, called if `enough` others remain, returns the index of the worst
-    attitude, its error in rad relative to the others, and the others' error.
+    `error_rad` is the standard deviation of all. `furthest` returns the index of the worst attitude, and two errors in
+    rad: that of this attitude and the standard deviation of the others. It is called if `enough` others remain.
     """
     message = f"the readings show that each attitude is off by {1e3 * error_rad:.2g} mrad"
     if error_rad > SUSPICIOUS_ERROR_RAD and enough:

@@ -59,7 +59,7 @@ class AllanCurve:
 
 @dataclass(frozen=True, slots=True)
 class AllanReading:
-    """A value read off the curve of one axis, its standard deviation, and the τ of the point on the curve."""
+    """A value that is read from the curve of one axis, its standard deviation, and the τ at which it was read."""
 
     value: float
     std: float
@@ -133,7 +133,10 @@ def equivalent_dof(points: int, factor: int, noise: Noise) -> float:
 
 
 def _average_squares(phases: Sequence[Array], factor: int) -> Array:
-    """Return the Allan variance (3,) of means of `factor` readings, from all long enough series, summed to `phases`."""
+    """Return the Allan variance (3,) of means of `factor` readings.
+
+    `phases` are for each series the running sums (nᵢ + 1, 3) of its readings; too short series are not used.
+    """
     total, count = np.zeros(3), 0
     for phase in phases:
         if len(phase) > 2 * factor:
@@ -145,7 +148,10 @@ def _average_squares(phases: Sequence[Array], factor: int) -> Array:
 
 
 def _dof(points: Sequence[int], factor: int, noise: Noise) -> float:
-    """Return the dof of the mean of independent intervals, weighted by their numbers of pairs (Satterthwaite)."""
+    """Return the dof of the mean Allan variance of independent series, weighted by their pairs (Satterthwaite).
+
+    `points` are the numbers of phases of the series; series without a pair of means are not used.
+    """
     reach = [n for n in points if n > 2 * factor]
     pairs = np.array([n - 2 * factor for n in reach], dtype=np.float64)
     of_interval = np.array([equivalent_dof(n, factor, noise) for n in reach])

@@ -44,7 +44,7 @@ class BiasProcess:
 
     @property
     def steady(self) -> bool:
-        """True if there is only noise."""
+        """True if neither a random walk, nor a scatter, nor a flicker is part of the process."""
         return not self.is_drifting and self.instability_rad_s == 0.0
 
     def covariance(self, windows_s: ArrayLike) -> Array:

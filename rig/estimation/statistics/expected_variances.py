@@ -84,9 +84,10 @@ def estimate_variances(fit: ResidualInputs, fractions: Sequence[float]) -> Error
 def estimate_disturbances(
     fit: ResidualInputs, sizes: ErrorSizes, causes: Sequence[Array], odds: Sequence[float]
 ) -> Array:
-    """Return the expected variances (k,) of `causes`, each given by its changes (n, q) of the readings at variance 1.
+    """Return the expected variances (k,) of k `causes` of additional errors.
 
-    The priors are log-uniform, with `odds` (k,) that the cause exists. At most one cause is assumed to exist at a time.
+    Each cause has independent errors, of which q columns (n, q) state the effects on the readings at variance 1. The
+    variances have log-uniform priors, and `odds` (k,) that the cause exists; at most one cause is assumed to exist.
     """
     effects = sizes.std_rad * fit.effects(sizes.independent_fraction)
     whitener = np.linalg.inv(np.linalg.cholesky(fit.covariance + sizes.walk**2 * fit.walk + effects @ effects.T))

@@ -52,9 +52,9 @@ def invert_squares(squares: Array) -> Array:
 
 
 def even_groups(part: NDArray[np.intp], parts: int) -> Array:
-    """Return the groups (n, p) for `mean_weights` in which the samples of a part count alike: 1 in it, 0 elsewhere.
+    """Return the groups (n, p) of `mean_weights` from the index `part` (n,) of each sample's group.
 
-    `part` (n,) is the index of each sample's part, −1 if it has none.
+    The index is −1 for a sample that belongs to no group; `parts` is the number p of groups.
     """
     groups: Array = (part[:, None] == np.arange(parts)).astype(np.float64)
     return groups

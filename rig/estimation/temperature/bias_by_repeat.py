@@ -71,10 +71,10 @@ def largest_change_std(bias: Array, std: Array) -> Array:
 
 
 def bias_by_repeat(readings: Array, variances: Array, modelled: Array, bias: Array | None = None) -> BiasByRepeat:
-    """Return the bias of R ≥ 2 repeats of N attitudes.
+    """Return the bias in each of R ≥ 2 repeats of N attitudes.
 
     `readings` (R, N, 3) are mean readings, `variances` their variances, `modelled` the model's readings without a bias.
-    `bias` (3,) is the bias of the first repeat if a fit has estimated it, and the other biases are relative to it.
+    If a fit has estimated the `bias` (3,) of the first repeat, the others are this bias plus their differences from it.
     Raise Fault `too_few_observations`, `not_finite`, `bad_variance`; ValueError for a wrong shape.
     """
     repeats, attitudes = readings.shape[:2]

@@ -103,7 +103,7 @@ def check_inside(range_c: tuple[float, float], temperature_c: float) -> None:
 
 
 def powers_at(difference_k: float) -> Array:
-    """Return the matrix (6, 24) from coefficients to scale k and offset c at a difference from the reference, K."""
+    """Return the matrix (6, 24) that maps coefficients to scale k and offset c at the reference + `difference_k`."""
     rows = np.kron(np.eye(2), np.kron(difference_k ** np.arange(MAX_ORDER + 1), np.eye(3)))
     return np.asarray(rows, dtype=np.float64)
 
