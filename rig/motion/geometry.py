@@ -86,7 +86,7 @@ def _last_three(arm: DenavitHartenberg) -> tuple[int, int, int]:
 
 
 def angle_waves(angle_rad: Array | float) -> Array:
-    """Return the `WAVES` of angles, (4, …)."""
+    """Return cos θ, sin θ, cos 2θ and sin 2θ (4, …) of angles θ (…)."""
     return np.array([np.cos(angle_rad), np.sin(angle_rad), np.cos(2 * angle_rad), np.sin(2 * angle_rad)])
 
 
@@ -159,7 +159,7 @@ def distance_to_upper_arm(
 
 
 def lengths_m(arm: DenavitHartenberg) -> Array:
-    """Return the measurable lengths `LENGTHS` (6,), m, of an arm, regardless of the parametrisation."""
+    """Return an arm's lengths (6,), m, that `LENGTHS` names, equal for all parameters that describe the same arm."""
     frames = _frames(np.zeros(6), arm)
     base, wrist_2, wrist_3, flange = (frames[joint][:3, 3] for joint in (0, 4, 5, 6))
     shoulder, elbow, wrist_1 = _find_bends(frames)
@@ -183,7 +183,7 @@ def _find_bends(frames: list[Array]) -> tuple[Array, Array, Array]:
 
 
 def _nearest_origin(point: Array, axis: Array, frame: Array) -> Array:
-    """Return the point (…, 3), m, where a frame's axis meets the plane through `point` at right angles to `axis`."""
+    """Return the point (…, 3), m, where a frame's z axis meets the plane through `point` perpendicular to `axis`."""
     other = frame[..., :3, 2]
     distance = _dot(point - frame[..., :3, 3], axis) / _dot(other, axis)
     origin: Array = frame[..., :3, 3] + distance[..., None] * other

@@ -88,8 +88,8 @@ class Sweep:
 class Transfer:
     """A motion between sweeps or attitudes, without measurement.
 
-    A transfer that `tries` the mounting is a small turn of one joint. The run ends unless the sensors sense this turn
-    about the axis, and with the sign, that the stage's mounting predicts.
+    If `tries` is true, the transfer is a small turn of one joint that tests the mounting. The run ends unless the
+    sensors sense this turn about the axis, and with the sign, that the stage's mounting predicts.
     """
 
     name: str
@@ -190,7 +190,7 @@ class Plan:
 
 
 def closes(angle_rad: float) -> bool:
-    """Return whether an angle is a whole number of turns; such an angle is exact even if the encoder is not."""
+    """Return whether an angle is one or more whole turns, so that an encoder's error at both ends cancels."""
     turns = round(angle_rad / TURN_RAD)
     return turns > 0 and abs(angle_rad - turns * TURN_RAD) < CLOSURE_TOLERANCE_RAD
 

@@ -32,7 +32,7 @@ class Plot:
     figure: "Figure"
 
     def save(self, path: str | Path) -> None:
-        """Write the figure into a file; its ending determines the format."""
+        """Write the figure into the file `path`, whose extension determines the format."""
         self.figure.savefig(path, dpi=DPI)
 
     def _repr_png_(self) -> bytes:

@@ -22,8 +22,8 @@ RAW, CORRECTED = "six_observation", "verify"  # procedures that judge any record
 class RecordedRun:
     """The recordings of a run, oldest first: `raw` as measured, and `corrected` by the board.
 
-    `path` is the run folder, or the run file of a single recording (`alone`). `script` is the script that
-    the user has named, or None.
+    `path` is the run folder or a run file. If `alone`, the recordings are judged without the run's other phases.
+    `script` is the script that the user has named, or None.
     """
 
     path: Path
@@ -59,6 +59,7 @@ def open_run(
     """Return the recordings in a run folder, or a run file; `script`, if given, is executed.
 
     `only` selects recordings of a folder by name; by default all are included, also those added to the folder later.
+    `begun` has, by path, the files whose reading has already begun.
     Raise Refused `no_run`, and what `read_run` and `load_script` raise.
     """
     named = None if script is None else load_script(script)

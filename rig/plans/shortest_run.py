@@ -217,7 +217,10 @@ class _TurnerSearch:
         return candidates
 
     def select_endless(self, candidates: Sequence[Candidate]) -> Sequence[Candidate]:
-        """Return each family's largest candidates, with up to two repeats, and the shortest or the longest rests."""
+        """Return of each family two runs: the largest with the shortest rests, and the largest with the longest rests.
+
+        Runs of more than `PREDICTED_REPEATS` repeats are not selected.
+        """
         selected = {
             (candidate.family, candidate.rests_s): candidate
             for candidate in sorted(candidates, key=lambda candidate: candidate.sizes)
@@ -267,7 +270,10 @@ class _TurnerSearch:
 
 
 def _longer_s(counts: Mapping[str, int], waits_s: Mapping[str, float], others_s: Mapping[str, float]) -> float:
-    """Return the extra duration, s, if waits, of which there are `counts`, last `others_s` instead of `waits_s`."""
+    """Return by how many seconds a run is longer if its waits last `others_s` instead of `waits_s`.
+
+    Both, and the numbers of waits `counts`, are by the key that states the wait.
+    """
     return sum(count * (others_s[key] - waits_s[key]) for key, count in counts.items())
 
 
@@ -288,7 +294,7 @@ class _HandSearch:
         return [self._candidate(*numbers) for numbers in product(FLIP_COUNTS, TURN_COUNTS, RESTS_S[:4])]
 
     def select_endless(self, candidates: Sequence[Candidate]) -> Sequence[Candidate]:
-        """Return only the candidate with the most flips, fewest turns and shortest rests, the best without noise."""
+        """Return only the candidate with the most flips, fewest turns and shortest rests: the best if noise is zero."""
         return [max(candidates, key=lambda candidate: (candidate.sizes[0], -candidate.sizes[1], -candidate.sizes[2]))]
 
     def finer(self, best: Candidate) -> Sequence[Candidate]:

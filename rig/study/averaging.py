@@ -52,7 +52,7 @@ def study(settings: Settings) -> StudyReport:
 def _simulate_gyroscope(runs: int, rng: np.random.Generator, _: int) -> Array:
     """Return relative errors of scale factors and errors of biases in rad/s, (noises, orders, runs, 6).
 
-    The orders are to average before squaring, then to square before averaging."""
+    The first of the two orders is to average the readings and then to square them, the second is the reverse."""
     scale, bias = sim.NORMAL.draw(rng)
     F = sim.build_sensitivity(scale, sim.draw_mountings(rng, runs))
     errors = np.empty((len(NOISES_RAD_S), len(ORDERS), runs, 6))

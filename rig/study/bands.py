@@ -37,7 +37,7 @@ class _Condition:
 
 
 def _list_conditions() -> list[_Condition]:
-    """Return the conditions: both estimators with whole turns, and Algorithm 1 also with white vibration."""
+    """Return all conditions: at each speed and noise both estimators, and Algorithm 1 again with white vibration."""
     kinds: tuple[tuple[sim.Vibration, str], ...] = (
         ("whole_turns", "algorithm_1"),
         ("whole_turns", "levenberg_marquardt"),

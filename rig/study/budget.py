@@ -86,7 +86,7 @@ class Session:
 
 
 def study(settings: Settings) -> StudyReport:
-    """Find the coverage of ± 2 u, and the RMS of error over standard uncertainty, with and without the remedies."""
+    """Find the coverage of ± 2 u, and the RMS of error over u, with and without the rig's remedies (see the module)."""
     ratios = errors(Effects(), settings)
     rows = [
         {
@@ -102,7 +102,10 @@ def study(settings: Settings) -> StudyReport:
 
 
 def errors(effects: Effects, settings: Settings) -> Array:
-    """Return errors of scale and bias divided by their std uncertainty, with and without remedies, (draws, 2, 6)."""
+    """Return errors (draws, 2, 6) of scale and bias over their standard uncertainty, first with the rig's remedies.
+
+    The second of the two is without these remedies, which the module lists.
+    """
     draws = settings.runs or DRAWS
     counts = [draws // BATCHES + (batch < draws % BATCHES) for batch in range(BATCHES)]
     return np.concatenate(run_parallel(partial(_simulate_batch, effects), [n for n in counts if n], settings))
@@ -113,12 +116,14 @@ def _simulate_batch(effects: Effects, rng: np.random.Generator, draws: int) -> A
 
 
 def _simulate_session(effects: Effects, rng: np.random.Generator) -> Array:
-    """Simulate a session with randomly drawn effects, and return the errors over their standard uncertainty (2, 6).
+    """Simulate a session with randomly drawn effects; return the ratios (2, 6) that `errors` returns for every draw.
+
+    The mean readings are
 
         m = K⁻¹ A ω − b + G f + drift + noise
 
-    are the mean readings (K scale factors, A axes, ω true rates, b bias, G f effect of gravity); the solver gets the
-    nominal motion, with rates by the controller's wrong clock.
+    with the scale factors K, the axes A, the true rates ω, the bias b, and the effect G f of gravity. The solver gets
+    the nominal motion, with rates by the controller's wrong clock.
     """
     scale, bias = rng.uniform(0.9, 1.1, 3), rng.uniform(-0.02, 0.02, 3)
     true = _build_session(rng.normal(0, effects.axis_rad, (3, 2)), effects.speed_rad_s)
@@ -200,17 +205,18 @@ def _apply_nonlinearity(along_rad_s: Array, effects: Effects, rng: np.random.Gen
 
 
 def _draw_warming(rng: np.random.Generator, effects: Effects, session: Session) -> tuple[Array, Array]:
-    """Draw the temperature of each average above that at the start, K (N,); return the true and the rounded one."""
+    """Return the drawn warming (N,), K, of the sensor from the start to each window, and the same, rounded."""
     middle_s = session.windows_s.mean(axis=1)
     warmth = effects.warming_k * rng.uniform(-1, 1) * (1 - np.exp(-middle_s / WARM_UP_S))
     return warmth, STEP_K * np.round(warmth / STEP_K)
 
 
 def _build_session(twists: Array, speed_rad_s: float) -> Session:
-    """Return six sweeps of wrists 3, 1 and 2 about flange z, y and x, each followed by a rest; sweeps come first.
+    """Return two sweeps each of wrists 3, 1 and 2, about the flange's z, y and x, and a rest after every sweep.
 
-    In the flange's frame a wrist's axis is fixed while that wrist turns, and `twists` (3, 2) tilt it. At home the
-    flange's x, y and z point forward, left and up in the base.
+    The arrays list the six sweeps first, then the rests. `twists` (3, 2) tilt the wrists' axes in the flange's frame;
+    each axis is fixed in this frame while its wrist turns. At home the flange's x, y and z point forward, left and up
+    in the base.
     """
     attitudes = []
     rates = []
@@ -265,7 +271,7 @@ def _draw_axes(rng: np.random.Generator) -> Array:
 
 
 def _draw_random_walk(rng: np.random.Generator, windows_s: Array, rate: float) -> tuple[Array, Array]:
-    """Return means of a random walk over the windows (N, 3), and over the whole time (3,)."""
+    """Return the means (N, 3) of a random walk over the windows, and its mean (3,) over the whole time."""
     times_s = np.arange(windows_s.min(), windows_s.max(), STEP_S)
     walk = np.cumsum(rate * np.sqrt(STEP_S) * rng.standard_normal((len(times_s), 3)), axis=0)
     inside = (times_s >= windows_s[:, :1]) & (times_s < windows_s[:, 1:])

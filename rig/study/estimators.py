@@ -46,7 +46,7 @@ def study(settings: Settings) -> StudyReport:
 
 
 def _simulate_gyroscope(runs: int, rng: np.random.Generator, _: int) -> Array:
-    """Return mean squared errors (speeds, estimators, 2, 6) of kx ky kz bx by bz, divided by the bound and absolute."""
+    """Return mean squared errors (speeds, estimators, 2, 6) of kx ky kz bx by bz: over the bound, then absolute."""
     scale, bias = sim.NORMAL.draw(rng)
     mounting = sim.draw_mountings(rng, 1)[0]
     F = sim.build_sensitivity(scale, mounting)

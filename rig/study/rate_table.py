@@ -147,7 +147,7 @@ def draw_drift(panel: "Axes", rows: list[dict[str, Any]], unit_name: str, limit:
 
 
 def find_drift_errors(rows: list[dict[str, Any]], column_unit: str, unit: str) -> Iterator[StudyFinding]:
-    """Yield two RMS errors of the bias over repeats and axes: for F and reference fixed, then for all estimated."""
+    """Yield two RMS errors of the bias over repeats and axes: with F and reference fixed, then with all estimated."""
     for kind, words in (("held", "F and reference fixed"), ("free", "all parameters estimated")):
         axes = [f"bias_{axis}_{column_unit}" for axis in "xyz"]
         errors = [row[f"{kind}_{axis}"] - row[f"true_{axis}"] for row in rows for axis in axes]
@@ -158,7 +158,10 @@ def find_drift_errors(rows: list[dict[str, Any]], column_unit: str, unit: str) -
 def build_parameter_rows(
     kind: str, names: Mapping[str, tuple[str, float]], truth: Array, estimates: Array, stated: Array
 ) -> list[dict[str, Any]]:
-    """Return one row per parameter from `estimates` (runs, p) and `stated` stds (p,); `names`: unit and unit's size."""
+    """Return one row per parameter, from `estimates` (runs, p) and `stated` stds (p,) in SI units.
+
+    `names` has for each parameter's name the unit of its row, and the size of that unit in SI.
+    """
     return [
         {
             "noise": kind,

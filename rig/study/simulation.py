@@ -78,9 +78,10 @@ def build_whole_turn(speed_rad_s: float, noise_rad_s: float, vibration: Vibratio
 
 
 def draw_mountings(rng: np.random.Generator, runs: int, largest: float = MAX_MISALIGNMENT) -> Array:
-    """Draw rotations (runs, 3, 3) from flange to sensor axes, about random axes, sine of the angle from U(0, largest).
+    """Draw rotations (runs, 3, 3) from flange to sensor axes; each is about a random axis.
 
-    The paper states only "misalignment U(0 %, 10 %)", taken here as the fraction of a rate that other axes sense.
+    The sine of the angle is uniformly distributed from 0 to `largest`. The paper states only "misalignment U(0 %,
+    10 %)", taken here as the fraction of a rate that other axes sense.
     """
     from scipy.spatial.transform import Rotation
 
@@ -91,7 +92,10 @@ def draw_mountings(rng: np.random.Generator, runs: int, largest: float = MAX_MIS
 
 
 def build_sensitivity(scale: Array, mounting: Array, skew: Array | None = None) -> Array:
-    """Return F (…, 3, 3) of m = F ω − b for scale factors (3,), mountings (…, 3, 3), skewed unit axes (…, 3, 3)."""
+    """Return the matrix F (…, 3, 3) of m = F ω − b, from scale factors (3,) and mountings (…, 3, 3).
+
+    The rows of `skew` (…, 3, 3) are unit vectors of non-orthogonal sensor axes; None stands for orthogonal axes.
+    """
     intrinsic = np.diag(1 / scale) if skew is None else np.diag(1 / scale) @ skew
     return np.asarray(intrinsic @ mounting, dtype=np.float64)
 
@@ -120,7 +124,7 @@ def draw_means_and_squares(
 
 
 def _draw_means(rng: np.random.Generator, F: Array, bias_rad_s: Array, sweep: SimulatedSweep) -> tuple[Array, Array]:
-    """Draw mean readings (…, 6, 3); return also each axis' reading per rad/s about the axis of the turn, (…, 6, 3)."""
+    """Return drawn mean readings (…, 6, 3) of six turns, and the readings (…, 6, 3) per rad/s of turn rate."""
     per_rate = np.asarray(np.einsum("...ij,sj->...si", F, DIRECTIONS), dtype=np.float64)
     speed: Array | float = sweep.speed_rad_s
     if sweep.vibration == "white":

@@ -16,9 +16,12 @@ NEGLIGIBLE_RATIO = 1e-6  # to the largest singular value: directions that attitu
 
 @dataclass(frozen=True, slots=True)
 class PlannedAverage:
-    """A planned average: the flange's rate, the arm's pose (at the start of a sweep), and the middle and duration.
+    """A planned average over a sweep, rest or dwell.
 
-    `on_the_way`: poses spaced evenly along an arc; empty for whole turns.
+    - `rate_rad_s`: the flange's rate in its own frame, zero at rest.
+    - `q_rad`: the arm's pose, in a sweep that at the start.
+    - `middle_s`, `duration_s`: the middle of the averaging time, from the first step on, and its length.
+    - `on_the_way`: poses spaced evenly along an arc; empty for whole turns.
     """
 
     rate_rad_s: Vector3
@@ -29,11 +32,11 @@ class PlannedAverage:
 
 
 def drift_effect(steps: Sequence[Step]) -> float:
-    """Return the change of the calibration, rad/s, for a bias that rises by 1 rad/s from first sweep to last step.
+    """Return the change of the calibration, rad/s, if the bias rises by 1 rad/s from the first average to the last.
 
     The vector model m = F ω + c (+ G a if there are rests; `rig.estimation.gyroscope.vector_model`) is fitted to this
-    ramp of the bias, with zero mean. The result is the root of the sum of squares of the changes of scale, at the mean
-    speed of the sweeps, and of bias. The base is upright; weights are for white noise.
+    ramp, less its mean. The result is the root of the sum of squares of the changes of scale, times the sweeps' RMS
+    speed, and of bias. The base counts as upright; each average has a weight in proportion to its duration.
     """
     looks = list(_list_averages(steps))
     rates = np.array([look.rate_rad_s for look in looks])
@@ -65,7 +68,7 @@ def _poses_on_arc(sweep: Sweep) -> tuple[Joints, ...]:
 
 
 def _list_averages(steps: Sequence[Step]) -> Iterator[PlannedAverage]:
-    """Yield the steps that are averaged: sweeps, the rests after sweeps, and dwells."""
+    """Yield the averages over sweeps, over dwells, and over the rests after the first motion."""
     time_s, pose = 0.0, None
     for step in steps:
         middle_s = time_s + step.duration_s / 2

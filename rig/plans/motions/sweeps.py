@@ -60,7 +60,10 @@ def sweep_about(index: int, station: SweepPose, direction: Direction, axis_flang
 def connect_sweeps(
     sweeps: Sequence[Sweep], home: Joints, pace: Pace, rest_s: float, is_clear: Callable[[Joints, Joints], bool]
 ) -> Iterator[Step]:
-    """Yield sweeps, each with a transfer to it (through home if the direct way is not clear) and a rest, then home."""
+    """Yield a transfer to each of the sweeps, the sweep, and a rest after it; finally the transfer home.
+
+    A transfer leads through home if the direct way is not clear.
+    """
     pose = home
     for sweep in sweeps:
         if not is_clear(pose, sweep.start_q_rad):
@@ -88,7 +91,7 @@ def build_stages(
     steps_of: Callable[[Sequence[Sweep]], Iterable[Step]],
     done: Collection[int],
 ) -> Plan:
-    """Return the plan of the approach, then of every stage's remaining sweeps, from home and back.
+    """Return the plan `approach` with the steps of every stage added, which `steps_of` makes from the stage's sweeps.
 
     Sweeps are numbered through all stages; those in `done` are left out. A stage without remaining sweeps has no steps.
     """
