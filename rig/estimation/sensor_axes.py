@@ -41,7 +41,7 @@ class SensorAxes:
 
     @property
     def to_angles(self) -> Array:
-        """The derivative (6, 9) of non-orthogonality and mounting; see `angle_jacobian`."""
+        """The derivative (6, 9) of non-orthogonality, then mounting, with respect to the matrix, row by row."""
         return angle_jacobian(self.axes, self.scale, self.mounting)
 
     @property

@@ -93,7 +93,7 @@ def _clearance_m(radius_m: float, room_m: float) -> float:
 def _measure_to_forearm(
     q_rad: Array, carried: FlangeLoad, model: TurnerModel, arm: DenavitHartenberg | None = None
 ) -> tuple[str, float]:
-    """Return the nearest part of the load to the forearm in the poses (N, 6), and its distance, m."""
+    """Return the part of the load that is nearest to the forearm in any of the poses (N, 6), and its distance, m."""
     names, points = _list_load_points(carried)
     offset_m, lengths = model.forearm.offset_m, arm or model.nominal
     return _find_nearest(names, distance_to_forearm(q_rad, points, lengths, offset_m=offset_m))

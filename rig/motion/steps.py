@@ -181,7 +181,7 @@ class Plan:
 
     @property
     def waits(self) -> tuple[Rest, ...]:
-        """The rests until a temperature is reached."""
+        """The rests that last until a temperature is reached."""
         return tuple(step for step in self.steps if isinstance(step, Rest) and step.for_temperature)
 
     @property

@@ -103,7 +103,8 @@ def load(path: str | Path, script: str | Path | None = None) -> Run:
 def read_log(path: str | Path, columns: str | Path | None = None) -> Readings:
     """Read a log of another program (CSV, a bag, `.ulg` or `.mat`) as `rig solve` does.
 
-    Values are in SI units. `columns` is the file of `--columns` for other names and units. Raise as `rig solve`.
+    `columns` is a file as for `rig solve --columns`, needed for a log with other names of columns or other units than
+    SI. Raise Fault and Refused as `rig solve` does.
     """
     column_map = STANDARD_NAMES if columns is None else load_as(ColumnMap, columns, MAP_REMEDY)
     recording = read_external_log(Path(path), column_map)

@@ -80,11 +80,7 @@ def still_open(wanted: WantedMoves, moves: Sequence[HandMove], faces_up: Sequenc
 
 
 def next_instruction(remaining: RemainingMoves, face: Face | None) -> Instruction | None:
-    """Return the next request for an item with side `face` up (None if unknown), or None at the end.
-
-    A turn about the vertical axis comes first, then a flip to the other face of an open pair. If neither is due with
-    this face up, the item is laid on another one: the first face of an open pair, a missing face, or that of a turn.
-    """
+    """Return the next request for an item with side `face` up (None if unknown), or None if no move remains."""
     if remaining.done or face is None:
         return None if remaining.done else Instruction("lay", FACE_ORDER[0])
     turn = next((candidate for candidate in remaining.turns if candidate[0] == face[1]), None)

@@ -59,8 +59,8 @@ def open_run(
     """Return the recordings in a run folder, or a run file; `script`, if given, is executed.
 
     `only` selects recordings of a folder by name; by default all are included, also those added to the folder later.
-    `begun` has, by path, the files whose reading has already begun.
-    Raise Refused `no_run`, and what `read_run` and `load_script` raise.
+    `begun` has, by path, the files whose reading has already begun. Raise Refused `no_run`, and what `read_run` and
+    `load_script` raise.
     """
     named = None if script is None else load_script(script)
     if not path.is_dir():

@@ -14,8 +14,8 @@ ENDING_REMEDY = 'Do not let it end the program: put what runs it alone below `if
 def script_errors(what: str, remedy: str = "Correct the script") -> Iterator[None]:
     """Raise Refused `script_failed` for any error in the block except Fault and Refused.
 
-    The message contains `what`, and the error with its position.
-    A script that ends the program is refused as well, because its exit status would be taken for a verdict.
+    The message contains `what`, and the error with its position. A script that ends the program is refused as well,
+    because its exit status would be taken for a verdict.
     """
     try:
         yield

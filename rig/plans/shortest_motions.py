@@ -49,7 +49,7 @@ def vary_attitudes(config: RigConfig) -> Iterator[Motion]:
 
 
 def vary_imu(config: RigConfig) -> Iterator[Motion]:
-    """Yield sweeps with attitudes. All sweeps have one speed and are single turns, the period of gravity's effect."""
+    """Yield sweeps with attitudes. Sweeps have one speed and turn once, because gravity's effect recurs every turn."""
     turns = [motion for motion in vary_arm(config) if motion[1] == TURNS_DEG[0] and not motion[2].get("speeds_deg_s")]
     for (family, turned, keys), (attitudes, _, stood) in product(turns, vary_attitudes(config)):
         yield (*family, *attitudes), turned, {**keys, **stood}

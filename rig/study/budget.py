@@ -102,9 +102,9 @@ def study(settings: Settings) -> StudyReport:
 
 
 def errors(effects: Effects, settings: Settings) -> Array:
-    """Return errors (draws, 2, 6) of scale and bias over their standard uncertainty, first with the rig's remedies.
+    """Return errors (draws, 2, 6) of scale and bias, divided by their standard uncertainty.
 
-    The second of the two is without these remedies, which the module lists.
+    Of the two, the first is with the rig's remedies, which the module lists, and the second without them.
     """
     draws = settings.runs or DRAWS
     counts = [draws // BATCHES + (batch < draws % BATCHES) for batch in range(BATCHES)]

@@ -58,7 +58,7 @@ def _track_verticals(conditions: SessionConditions, integrals: MoveIntegrals) ->
 def _count_turns(
     session: HandRecording, integrals: MoveIntegrals, faces: tuple[str | None, ...], up: Array, row: int
 ) -> int:
-    """Return the signed number of whole turns in the move `row`, 0 unless it turned about its face's axis."""
+    """Return the signed number of whole turns in the move `row`; 0 for a move that is not a turn on one face."""
     if faces[row] is None or faces[row] != faces[row + 1] or not session.moves[row].is_usable:
         return 0
     angle = float(up[row] @ integrals.swept_rad[row])

@@ -140,9 +140,9 @@ def _fault_columns(fit: GraphFit, name: str, index: int) -> Array:
 
 
 def _tilt_columns(fit: GraphFit, row: Factor, index: int) -> Array:
-    """Return the derivatives (r, 2) of a factor's equations by a tilt of the table before rest `index` that remains.
+    """Return the derivatives (r, 2) of a factor's equations by a lasting tilt of the table before rest `index`.
 
-    The changes are zero for the move to the last rest, where a tilted table looks like a body that does not lie flat.
+    They are zero for the move to the last rest, where a tilted table looks like a body that does not lie flat.
     """
     other = np.zeros((len(row.design), 2))
     if row.kind == ACCELERATION and row.index >= index:

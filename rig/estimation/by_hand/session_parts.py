@@ -116,7 +116,8 @@ MAX_STDS = HandStds(5e-3, 2e-2, 3e-3, 1e-3, 0.05)  # plausible errors of handlin
 class RestFaces:
     """The face of each rest (N,), that is, the axis that pointed upwards, or None.
 
-    `up` (N, 3) is this axis, or the measured vertical if the face is None; `turns` (N − 1,) are the moves' whole turns.
+    `up` (N, 3) is this axis, or the measured vertical if the face is None; `turns` (N − 1,) are the signed numbers of
+    whole turns in the moves.
     """
 
     faces: tuple[str | None, ...]

@@ -179,9 +179,9 @@ def _relate_errors(laid: PlacementSolution, all_rests: AttitudeReadings, stated:
 
 
 def _find_log_prior(grid: Array, size: float) -> Array:
-    """Return the log prior density (n,) of the logarithms `grid` (n, 2) of two standard deviations.
+    """Return the log prior density (n,), over their logarithms, of n pairs of standard deviations `grid` (n, 2).
 
-    The density is uniform in the first, that of attitude errors, and half-Cauchy in the second, that of placement
+    The prior is uniform in the first, that of attitude errors, and half-Cauchy in the second, that of placement
     errors. `size` is the norm of the reference.
     """
     delta, zeta = grid.T

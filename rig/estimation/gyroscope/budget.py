@@ -223,7 +223,10 @@ def _contributors(explained: VectorFit, unknown: UnknownErrors) -> Iterator[Cont
 
 
 def _evaluate_mounts(explained: VectorFit, unknown: UnknownErrors, propagate: Propagate) -> Iterator[Contributor]:
-    """Yield the contributors of encoders at the ends of arcs, and of remounting; `propagate` as in `_contributors`."""
+    """Yield the contributors of encoders at the ends of arcs, and of remounting.
+
+    `propagate` maps errors of the readings to the covariance of scale and bias.
+    """
     inputs, matrix = explained.inputs, explained.solution.matrix
     if inputs.encoder_errors_rad_s is not None:
         spread = propagate(inputs.encoder_errors_rad_s @ matrix.T)
@@ -238,7 +241,11 @@ def _evaluate_mounts(explained: VectorFit, unknown: UnknownErrors, propagate: Pr
 def _evaluate_times(
     inputs: VectorInputs, unknown: UnknownErrors, turned: Array, propagate: Propagate
 ) -> Iterator[Contributor]:
-    """Yield the contributors of the times of the arm's states and of the samples; `turned` as in `_contributors`."""
+    """Yield the contributors of the times of the arm's states and of the samples.
+
+    `turned` (N, 3) are the flange's rates as the sensor reads them; `propagate` maps errors of the readings to the
+    covariance of scale and bias.
+    """
     per_s = np.sqrt(2) / np.diff(inputs.windows_s).T[0]
     per_sweep = np.eye(len(turned))[:, :, None]
     jitter = per_sweep * ((unknown.state_jitter_s * per_s * inputs.state_gains)[:, None] * turned)[None]

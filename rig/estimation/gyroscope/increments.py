@@ -100,10 +100,7 @@ def integrate_attitudes(time_s: Array, readings: Array, matrix: Array, bias: Arr
 
 
 def track(time_s: Array, readings: Array, matrix: Array) -> Track:
-    """Return the attitudes at the times of the readings (n, 3), which are integrated as if they had no bias.
-
-    `integrate_attitudes` states the units and what it raises.
-    """
+    """Return the attitudes at the times of the readings (n, 3), which are integrated as if they had no bias."""
     inverse = np.asarray(np.linalg.inv(matrix), dtype=np.float64)
     interval = _find_slopes(time_s, readings @ inverse.T)
     steps = _whole_steps(interval)

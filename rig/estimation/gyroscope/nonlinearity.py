@@ -35,7 +35,7 @@ def distinct_speeds(speeds_rad_s: Array) -> tuple[float, ...]:
 
 
 def curvature(matrix: Array, rates_rad_s: Array) -> Array:
-    """Return the effects (6, N, 3) on readings of the odd parts of x, y, z, then of the even parts.
+    """Return the effects (6, N, 3) on readings of the nonlinearity's odd parts along x, y, z, then of its even parts.
 
     Each part has the size `PRIOR_STD_PER_RAD_S`. `rates_rad_s` (N, 3) are mean rates in the flange's frame, which the
     gyroscope's `matrix` F (3, 3) maps to its readings.
@@ -49,8 +49,8 @@ def curvature(matrix: Array, rates_rad_s: Array) -> Array:
 def nonlinear_effects(matrix: Array, rates_rad_s: Array, full_scale_rad_s: float, true_at_rad_s: float = 0.0) -> Array:
     """Return the effects (6, N, 3) of cubes along x, y, z, then of squares, each of unit size at full scale.
 
-    The first two arguments are those of `curvature`. A linear term is subtracted from the cubes, so that they have no
-    effect at the speed `true_at_rad_s`, to which F then refers.
+    `matrix` F (3, 3) maps the mean rates (N, 3) in the flange's frame to readings. A linear term is subtracted from the
+    cubes, so that they have no effect at the speed `true_at_rad_s`, to which F then refers.
     """
     readings = rates_rad_s @ matrix.T
     projected = readings / np.linalg.norm(matrix, axis=1) / full_scale_rad_s

@@ -107,7 +107,7 @@ def rounding_errors(means_rad_s: Array, roundings_rad_s: Array | float, variance
 
 
 def _temperature_deviations_k(sensor: SensorProperties, windows_s: Array, weights: Array) -> Array:
-    """Return the deviations (2, N), K, from the weighted mean temperature: as recorded, then those of `unseen_k`."""
+    """Return the deviations (2, N), K, from the mean temperature: those recorded, then those that may be hidden."""
     recorded = subtract_mean(sensor.temperature_c, weights)
     return np.array([recorded, unseen_k(sensor.temperature_step_k, windows_s, weights)])
 

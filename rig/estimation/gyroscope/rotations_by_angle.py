@@ -6,10 +6,9 @@ The rate during a rotation does not matter, so a hand may turn the gyroscope. Th
     Log(exp(n α) R(F, c)ᵀ) = J δθ + e
 
 R is the body's rotation, integrated from the gyroscope's readings m = F ω + c, n the axis in the body's frame, α the
-angle, δθ the error of F and c, and J the derivative by these. e contains the end attitude's error about all three
-axes, the effect of a tilted axis, and the gyroscope's noise.
-A whole revolution determines nᵀ F n alone; the mean reading determines the components across n, if the axis is fixed in
-the body:
+angle, δθ the error of F and c, and J the derivative by these. e contains the end attitude's error about all three axes,
+the effect of a tilted axis, and the gyroscope's noise. A whole revolution determines nᵀ F n alone; the mean reading
+determines the components across n, if the axis is fixed in the body:
 
     m̄ = F n α/T + c                                                      across F n
 

@@ -108,9 +108,9 @@ def solve_attitude_weighted(start: Array, placed: AttitudeReadings) -> AttitudeW
 
 
 def find_worst_attitude(start: Array, placed: AttitudeReadings, fit: AttitudeWeighted) -> tuple[int, float, float]:
-    """Return the index of the attitude that fits worst, its error in rad, and the error in rad that is expected.
+    """Return the index of the attitude that fits worst, its error in rad, and that error's standard deviation.
 
-    Both errors follow from a fit to the other attitudes, because the worst one would distort the fit.
+    Both follow from a fit to the other attitudes, because the worst one would distort the fit.
     """
     residuals = placed.readings - predicted(fit.theta, placed.attitudes, placed.v_bar)
     worst = int(np.argmax(np.sum(whitened(fit.whiteners, residuals) ** 2, axis=1)))

@@ -166,7 +166,7 @@ def solve_imu(
 
 
 def _check_attitudes(start: Array, movement: Movement, fixed: list[int], fit: Fit) -> None:
-    """Raise Fault if all attitudes are wrong, or if one is and enough others remain to identify it."""
+    """Raise Fault if all attitudes are wrong, or if one is wrong and the others suffice to identify it."""
     enough = len(movement.dwells.readings_m_s2) > 0 and movement.readings().size - 3 > fit.free.shape[1] + 3
     check_trustworthy(fit.std_rad, lambda: _find_worst_dwell(start, movement, fixed, fit), enough=enough)
 

@@ -122,7 +122,7 @@ def _expand_bias(covariance: Array, movement: Movement) -> Array:
 
 
 def select_sweeps(movement: Movement) -> Array:
-    """Return the readings (3 K, 3) due to a bias of 1 of each axis that is present in sweeps but not in dwells."""
+    """Return the readings (3 K, 3) due to a unit bias of each axis in sweeps alone, not in dwells."""
     turning = movement.constant()
     turning[: len(movement.dwells.readings_m_s2)] = 0.0
     return per_axis(turning[:, None] * np.ones(3))

@@ -34,7 +34,7 @@ class JointTurn:
 
     - `speed_rad_s`: 2π over the time of a revolution, negative if the angle falls.
     - `angle_rad` (n,): from the arm's states, zero at the start of the revolution.
-    - `acceleration_rad_s2` (n,): see `estimate_acceleration`.
+    - `acceleration_rad_s2` (n,): the angular acceleration, as `estimate_acceleration` returns it.
     """
 
     speed_rad_s: float

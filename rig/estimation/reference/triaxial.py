@@ -249,7 +249,7 @@ def _errors_in_x(m: Array, v: Array, method: Method) -> tuple[str, ...]:
 
 
 def _check_attitudes(start: Array, placed: AttitudeReadings, fit: AttitudeWeighted) -> None:
-    """Raise Fault if all attitudes are wrong, or if one is and enough others remain to identify it."""
+    """Raise Fault if all attitudes are wrong, or if one is wrong and the others suffice to identify it."""
     enough = 3 * (len(placed.readings) - 1) > len(start) + 3
     check_trustworthy(fit.attitude_error.std_rad, lambda: find_worst_attitude(start, placed, fit), enough=enough)
 

@@ -112,7 +112,7 @@ def read_axis(curve: AllanCurve, axis: int) -> AllanAxis:
 
 
 def too_short(what: str, enough_s: float = MIN_DURATION_S) -> Fault:
-    """Return the error for a recording that is too short for the value `what`; about `enough_s` would suffice."""
+    """Return the Fault for a recording that is too short for the value `what`; about `enough_s` would suffice."""
     return Fault("recording_too_short", what, f"Record at rest for {enough_s:.0f} s or more without interruption")
 
 
@@ -148,7 +148,7 @@ def _average_squares(phases: Sequence[Array], factor: int) -> Array:
 
 
 def _dof(points: Sequence[int], factor: int, noise: Noise) -> float:
-    """Return the dof of the mean Allan variance of independent series, weighted by their pairs (Satterthwaite).
+    """Return the dof of the mean Allan variance of independent series, weighted by their numbers of pairs of means.
 
     `points` are the numbers of phases of the series; series without a pair of means are not used.
     """

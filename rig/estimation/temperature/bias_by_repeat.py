@@ -116,7 +116,10 @@ def _excess(errors: Array, variances: Array) -> Array:
 
 
 def _find_steps(bias: Array, std: Array, start: int, end: int, candidates: int) -> Iterator[BiasStep]:
-    """Yield the steps of the bias from `start` to `end`, in a run with `candidates` possible steps."""
+    """Yield the significant steps of the bias between repeats `start` and `end` of a run.
+
+    `candidates` is the number of possible steps in the run; the more there are, the larger a significant step is.
+    """
     from scipy.special import ndtri
 
     sure = -float(ndtri(false_alarm_of_each(FALSE_ALARM_PROBABILITY, 2 * 3 * candidates)))

@@ -42,9 +42,9 @@ def fit_over_temperature(readings: RepeatedMeans, reference_c: float, gradient_k
     """Return scale and bias as polynomials of T − `reference_c`, fitted to the readings.
 
     Plain least squares determine the scale factors at the reference; `combine_with_reference` replaces them by better
-    ones. When the sensor is in use, the temperature difference between thermometer and sensor may differ by up to
-    `gradient_k`. Raise Fault `too_few_observations`, `temperature_range_too_small`, `temperature_outside`,
-    `not_finite`.
+    ones. When the sensor is in use, the temperature difference between thermometer and sensor may deviate from that in
+    these readings by up to `gradient_k`. Raise Fault `too_few_observations`, `temperature_range_too_small`,
+    `temperature_outside`, `not_finite`.
     """
     check_finite(means=readings.means, temperature_c=readings.temperature_c)
     range_c = (float(readings.temperature_c.min()), float(readings.temperature_c.max()))

@@ -23,7 +23,7 @@ class RepeatedMeans:
     """Mean readings of repeated poses.
 
     - `means` (N, 3) and their `variances` (N, 3); `inputs` (N, 3): rates or specific forces in body axes.
-    - `poses` (N,): the index of the plan's pose; `windows_s` (N, 2); `temperature_c` (N,), as measured.
+    - `poses` (N,): the index of the plan's pose; `windows_s` (N, 2): start and end; `temperature_c` (N,), as measured.
     - `instability`: the Allan deviation of the bias' flicker.
     """
 
@@ -205,7 +205,10 @@ class ParameterFits:
         return TemperatureFit(relative, bias, covariance, without_lag, aicc, float(values[-1]), lag_std_s, loop)
 
     def centre(self, fit: TemperatureFit) -> Array:
-        """Return the mean powers (2, 3, 3) of T − reference, weighted as in the means of scale, then of bias."""
+        """Return the means (2, 3, 3) of the powers 1 to 3 of T − reference, for each axis.
+
+        Of the two, the first has the weights of the mean scale, the second those of the mean bias.
+        """
         powers = self.powers[:, 1:] * self.span ** np.arange(1.0, MAX_ORDER + 1)
         centre: Array = np.einsum("qan,np->qpa", self.weights, powers) / self.weights.sum(axis=2)[:, None, :]
         return centre

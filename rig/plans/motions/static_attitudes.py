@@ -23,8 +23,8 @@ def plan_static_attitudes(
     """Return the plan that visits all attitudes in the fastest order, `repeats` times, and begins and ends at home.
 
     `start_q_rad` is the arm's pose (home if None); from there the plan first goes home slowly. `done`: the indices of
-    finished dwells, which are left out. The turner's `problems` checks limits and clearances,
-    `rig.analysis.design.attitude_information` the rank of the attitudes.
+    finished dwells, which are left out. Limits and clearances are checked by the turner's `problems`, the rank of the
+    attitudes is checked by `rig.analysis.design.attitude_information`.
     """
     before = approach(start_q_rad, find_home(arm), pace_of(arm.transfer_speed_deg_s, procedure.acceleration_deg_s2))
     return append_steps(before, dwells(arm, procedure, procedure.repeats, done))

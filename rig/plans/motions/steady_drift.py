@@ -19,7 +19,7 @@ class PlannedAverage:
     """A planned average over a sweep, rest or dwell.
 
     - `rate_rad_s`: the flange's rate in its own frame, zero at rest.
-    - `q_rad`: the arm's pose, in a sweep that at the start.
+    - `q_rad`: the arm's pose, for a sweep at its start.
     - `middle_s`, `duration_s`: the middle of the averaging time, from the first step on, and its length.
     - `on_the_way`: poses spaced evenly along an arc; empty for whole turns.
     """

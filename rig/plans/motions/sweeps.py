@@ -91,7 +91,7 @@ def build_stages(
     steps_of: Callable[[Sequence[Sweep]], Iterable[Step]],
     done: Collection[int],
 ) -> Plan:
-    """Return the plan `approach` with the steps of every stage added, which `steps_of` makes from the stage's sweeps.
+    """Return the plan `approach`, followed by the steps of every stage, which `steps_of` makes from the stage's sweeps.
 
     Sweeps are numbered through all stages; those in `done` are left out. A stage without remaining sweeps has no steps.
     """

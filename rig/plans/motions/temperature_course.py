@@ -51,7 +51,7 @@ class TemperatureCourse:
             self.warming = True
 
     def is_due(self, now_c: Mapping[str, float]) -> bool:
-        """Return whether the sensors' temperatures are far enough for the next set of sweeps, or at the range's end."""
+        """Return whether the sensors are at the range's end, or far enough from the last set's temperatures."""
         if not self.sets:
             return True
         if min(now_c.values()) >= self.to_c if self.warming else max(now_c.values()) <= self.from_c:
