@@ -125,6 +125,7 @@ def _simulate_session(effects: Effects, rng: np.random.Generator) -> Array:
     with the scale factors K, the axes A, the true rates ω, the bias b, and the effect G f of gravity. The solver gets
     the nominal motion, with rates by the controller's wrong clock.
     """
+    # The true motion, and the readings of a sensor with all effects.
     scale, bias = rng.uniform(0.9, 1.1, 3), rng.uniform(-0.02, 0.02, 3)
     true = _build_session(rng.normal(0, effects.axis_rad, (3, 2)), effects.speed_rad_s)
     nominal = _build_session(np.zeros((3, 2)), effects.speed_rad_s)
@@ -154,10 +155,11 @@ def _simulate_session(effects: Effects, rng: np.random.Generator) -> Array:
         1 + (warmth - np.average(warmth, weights=sweeps))[:, None] * scale_slope
     )
     means = sensed / scale - bias + g_bias + drift + noise
+    # The motion that the controller reports, and what the solver knows about the effects.
     clock = rng.uniform(-effects.clock, effects.clock)
     jitter = rng.normal(0, np.sqrt(2) * effects.jitter_s, len(durations)) / durations
     reported = nominal.rates_rad_s * (1 - clock + jitter)[:, None]
-    truth = np.concatenate([scale, bias - mean_drift])
+    truth = np.concatenate([scale, bias - mean_drift])  # the reading is −b + drift, so the drift lowers the bias
     corrected = reported * (1 + clock + rng.normal(0, effects.clock_known))
     inputs = VectorInputs(
         means_rad_s=means,

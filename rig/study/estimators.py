@@ -106,7 +106,7 @@ def _simulate_rate_table(runs: int, rng: np.random.Generator, _: int) -> dict[st
         second = rt.ACCELEROMETER_SECOND_ORDER if order == 2 else np.zeros(3)
         force = rt.project(attitudes, reference)
         model = (force + second * force**2) @ rt.ACCELEROMETER_MATRIX.T + rt.ACCELEROMETER_BIAS_M_S2
-        noise = np.full((TABLE_POSES, 3), rt.ACCELEROMETER_RANDOM_WALK / np.sqrt(60))
+        noise = np.full((TABLE_POSES, 3), rt.ACCELEROMETER_RANDOM_WALK / np.sqrt(60))  # means over a minute
         readings = model + noise * rng.normal(size=(runs, *model.shape))
         truth = np.concatenate([rt.ACCELEROMETER_MATRIX.ravel(), reference, rt.ACCELEROMETER_BIAS_M_S2])
         if order == 2:

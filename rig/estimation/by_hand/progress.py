@@ -70,7 +70,7 @@ def assess_progress(session: HandRecording, conditions: SessionConditions) -> Se
     covariance = fitted.covariance[np.ix_(chosen, chosen)]
     to_parameters = parameter_jacobian(fitted.state.matrix, axes.scale)
     expanded = 2 * np.sqrt(np.diag(to_parameters @ covariance @ to_parameters.T)[:3])
-    expanded = np.hypot(expanded, 2e-6 / np.sqrt(3) * conditions.clock_ppm * axes.scale)
+    expanded = np.hypot(expanded, 2e-6 / np.sqrt(3) * conditions.clock_ppm * axes.scale)  # clock_ppm is a half-width
     solution = summarise_fit(fitted)
     faces = fitted.faces.faces
     return SessionProgress(

@@ -211,6 +211,7 @@ def _explain(
         gravity_m_s2,
         mounting,
     )
+    # First a fit with a steady bias: the means less its errors of arm and nonlinearity show how the bias drifts.
     errors = model.predict().errors
     matrix = model.fit_matrix(errors.readings_rad_s)
     patterns, of_sensor = arm_and_speed_patterns(matrix), inputs.sensor_error_patterns(matrix)

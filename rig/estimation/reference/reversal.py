@@ -72,6 +72,7 @@ def separate(biases_t: Array, covariances_t2: Array, matrices: Array, mountings:
             "Make sure that the sensor is in the same place in all runs and that the field did not change between "
             "them; then repeat",
         )
+    # The bias stays in the sensor's axes; the field goes from the holder's axes to the sensor's in the first run.
     to_axes = np.block([[np.eye(3), np.zeros((3, 3))], [np.zeros((3, 3)), mountings[0]]])
     covariance = to_axes @ (inverse @ inverse.T) @ to_axes.T
     inseparable = np.abs(mountings[0] @ common).max(axis=1, initial=0.0) > MOUNTING_TOLERANCE

@@ -70,7 +70,7 @@ def bias_over_temperature(bias: Array, std: Array, temperature_c: Array, time_s:
         design = columns * weights[:, None]
         coefficients, *_ = np.linalg.lstsq(design, bias[:, axis] * weights, rcond=None)
         residuals = bias[:, axis] * weights - design @ coefficients
-        excess = max(1.0, float(np.sqrt(np.sum(residuals**2) / residual_dof)))
+        excess = max(1.0, float(np.sqrt(np.sum(residuals**2) / residual_dof)))  # Birge ratio
         dof[axis] = residual_dof if excess > 1.0 else np.inf
         slope[axis] = coefficients[1] / float(np.std(temperature_c))
         slope_std[axis] = excess * float(np.sqrt(np.linalg.inv(design.T @ design)[1, 1]) / np.std(temperature_c))

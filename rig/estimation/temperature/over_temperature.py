@@ -57,12 +57,13 @@ def fit_over_temperature(readings: RepeatedMeans, reference_c: float, gradient_k
     check_inside(range_c, reference_c)
     readings = _drop_rare_poses(readings)
     fits = ParameterFits(readings, reference_c, range_c)
-    fits.refer(readings, fits.solve((fits.highest, fits.highest)))
+    fits.refer(readings, fits.solve((fits.highest, fits.highest)))  # inputs x at the reference temperature
     every_order = range(fits.highest + 1)
     tried = {orders: fits.solve(orders) for orders in product(every_order, every_order)}
     best = min(tried, key=lambda orders: tried[orders].aicc)
     chosen = tried[best]
     centre = fits.centre(chosen)
+    # Akaike weights, relative to that of the best orders.
     weights = {orders: float(np.exp((chosen.aicc - fit.aicc) / 2)) for orders, fit in tried.items()}
     total = sum(weights.values())
     chosen_coefficients = _centre_coefficients(chosen, centre)
