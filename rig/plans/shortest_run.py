@@ -175,7 +175,7 @@ def _directions(plan: Plan) -> Array | None:
 
 
 def _longest(candidates: Sequence[Candidate], family: tuple[object, ...], at_most_s: float) -> list[Candidate]:
-    """Return a list with only the longest candidate of a family that lasts `at_most_s`; empty if there is none."""
+    """Return a list with only the longest candidate of a `family` within `at_most_s`; empty if there is none."""
     same = [candidate for candidate in candidates if candidate.family == family and candidate.duration_s <= at_most_s]
     return sorted(same, key=lambda candidate: candidate.duration_s)[-1:]
 

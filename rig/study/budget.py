@@ -116,7 +116,7 @@ def _simulate_batch(effects: Effects, rng: np.random.Generator, draws: int) -> A
 
 
 def _simulate_session(effects: Effects, rng: np.random.Generator) -> Array:
-    """Simulate a session with randomly drawn effects; return the ratios (2, 6) that `errors` returns for every draw.
+    """Simulate a session with randomly drawn effects; return its ratios (2, 6) of error to uncertainty, as `errors`.
 
     The mean readings are
 

@@ -161,7 +161,7 @@ class Graph:
 
     @cached_property
     def residuals_rad(self) -> Array:
-        """The rotation vectors (N − 1, 3) of R (Qᵢᵀ Qⱼ)ᵀ: by how much the gyroscope's rotation exceeds `between`."""
+        """The rotation vectors (N − 1, 3) by which the gyroscope's rotation in each move exceeds that in `between`."""
         return rotation_vectors(self.integrals.rotations @ np.swapaxes(self.between, -1, -2))
 
     @cached_property

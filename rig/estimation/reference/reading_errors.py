@@ -81,7 +81,7 @@ def scale_warming(theta: Array, movement: Movement) -> Array:
 
 
 def _warmer_k(sensor: AccelerometerErrors, movement: Movement) -> tuple[Array, Array]:
-    """Return the recorded temperature at K readings minus the mean (K,), and the part hidden by rounding (K,), in K."""
+    """Return two deviations (K,) from the mean temperature, K: the recorded ones, and those that rounding hides."""
     return repeat_by_segment(sensor.warmer_k, movement), repeat_by_segment(sensor.unseen_k, movement)
 
 

@@ -74,7 +74,7 @@ def bias_by_repeat(readings: Array, variances: Array, modelled: Array, bias: Arr
     """Return the bias in each of R ≥ 2 repeats of N attitudes.
 
     `readings` (R, N, 3) are mean readings, `variances` their variances, `modelled` the model's readings without a bias.
-    If a fit has estimated the `bias` (3,) of the first repeat, the others are this bias plus their differences from it.
+    If a fit gives the `bias` (3,) of the first repeat, all biases are shifted so that the first is equal to it.
     Raise Fault `too_few_observations`, `not_finite`, `bad_variance`; ValueError for a wrong shape.
     """
     repeats, attitudes = readings.shape[:2]

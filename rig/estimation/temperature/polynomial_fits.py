@@ -242,9 +242,9 @@ def heating_rate(windows_s: Array, temperature_c: Array) -> tuple[Array, Array]:
 
 
 def _coefficients_from_changes(centre: Array, which: int) -> Array:
-    """Return the matrix (12, 18) that maps errors of the coefficients 1 to 3 of scale and bias to those of one of them.
+    """Return the matrix (12, 18) that adds order 0 to the coefficients' errors, of scale (`which` = 0) or bias (1).
 
-    The latter are the errors of the orders 0 to 3 of the scale (`which` = 0) or of the bias (1).
+    It maps the errors of the orders 1 to 3 of both to those of the orders 0 to 3 of one.
 
     Order 0 is the value at the reference. The mean value over the readings is fixed, so an error of a coefficient
     changes order 0 by minus that error times the mean power of T − reference, `centre` (2, 3, 3).
