@@ -62,7 +62,7 @@ class RateMean:
 
 @dataclass(frozen=True, slots=True)
 class Gyroscope:
-    """All readings (n, 3) in rad/s at times (n,), the angle random walk, and the std (3,) of the bias about its mean."""
+    """All readings (n, 3) in rad/s at times (n,), angle random walk, and the std (3,) of the bias about its mean."""
 
     time_s: Array
     readings: Array
