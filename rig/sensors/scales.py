@@ -15,7 +15,7 @@ def fine_axes(quantity: Quantity, end_of_scale: float) -> Channel:
 
 
 def thermometer_channels(provided: Channel | None, stated: StatedTemperatureSection | None) -> tuple[Channel, ...]:
-    """Return a tuple of the channel of the provided or else of the stated temperature; empty if there is neither."""
+    """Return a tuple of one channel, of the `provided` or else the `stated` temperature; empty if there is neither."""
     if provided is not None:
         return (provided,)
     return () if stated is None else (make_stated_temperature_channel(stated.stated_c, stated.stated_within_k),)

@@ -1,4 +1,4 @@
-"""Format C's magnetic field: three of four messages contain one axis each, x, y, z. Pure."""
+"""Format C's magnetic field: of every four messages, three contain one axis each, in the order x, y, z. Pure."""
 
 from typing import Any
 
@@ -13,10 +13,10 @@ GAUSS_T = 1e-4
 
 
 class MagneticFieldReader:
-    """The assembler of one stream's field samples, FIELD_SAMPLE_DTYPE; readings without all three axes are lost.
+    """The assembler of one stream's field samples, FIELD_SAMPLE_DTYPE; readings without all three axes are left out.
 
-    `t_per_count` is the size of a count, `full_scale_counts` the largest count. A sample has the time of the message
-    with its y axis; samples are numbered from the first complete reading.
+    `t_per_count` is the size of a count in tesla, `full_scale_counts` the largest count. A sample has the time of the
+    message with its y axis; samples are numbered from the first complete reading.
     """
 
     def __init__(self, t_per_count: float, full_scale_counts: int) -> None:

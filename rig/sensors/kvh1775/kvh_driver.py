@@ -24,9 +24,10 @@ OnMessages = Callable[[NDArray[Any], NDArray[Any], NDArray[Any], float], None]
 
 
 class Kvh1775:
-    """The instrument on a serial port or `socket://host:port`, until `close`. `on_messages` runs on its thread.
+    """The instrument on a serial port or `socket://host:port`, which stays open until `close`.
 
-    Its errors are SensorErrors with names that begin with `kvh_`; their messages name the configured `sensor`.
+    A thread reads the port and calls `on_messages`. Errors are SensorErrors with names that begin with `kvh_`; their
+    messages name the configured `sensor`.
     """
 
     def __init__(
@@ -108,7 +109,7 @@ class Kvh1775:
         )
 
     def start(self, settings: Kvh1775Settings) -> None:
-        """Pass messages to `on_messages`, beginning with the next one."""
+        """Pass messages, in the format and at the rate of `settings`, to `on_messages`, beginning with the next one."""
         with self.own_port.news:
             self._counter = MessageCounter(self._where, 1e6 / settings.rate_hz, timed=settings.message == "B")
             self._format = settings.message.encode()

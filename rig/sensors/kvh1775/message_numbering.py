@@ -15,10 +15,11 @@ _US_WRAP = 1 << 32
 
 @dataclass(slots=True)
 class MessageCounter:
-    """The numbers of one stream's messages from 0, with lost ones included.
+    """The numbers of one stream's messages from 0. Lost messages are counted too.
 
-    Formats A and C have only the sequence number, modulo 128, so a loss of 128 messages in a row would not be noticed.
-    Therefore a silence of that length on the computer's clock is refused. Format B also has microseconds.
+    `timed`: whether messages state microseconds, as in format B. Those of formats A and C have only the sequence
+    number, modulo 128, which does not show a loss of 128 messages in a row. A silence that long, by the computer's
+    clock with an error of up to `host_jitter_s`, is therefore refused.
     """
 
     where: str  # the name of the instrument in messages
@@ -33,8 +34,8 @@ class MessageCounter:
     def count(self, messages: NDArray[Any], silent_s: float = 0.0) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Return the running numbers (n,) and times (n,) in µs of messages (n,) that follow a silence of `silent_s`.
 
-        Raise SensorError: `kvh_gap_ambiguous` after 128 messages or more lost in a row, `kvh_time_contradicts` if
-        sequence numbers and microseconds disagree.
+        Raise SensorError: `kvh_gap_ambiguous` if 128 or more messages in a row may have been lost,
+        `kvh_time_contradicts` if sequence numbers and microseconds disagree.
         """
         if not len(messages):
             return np.empty(0, np.int64), np.empty(0, np.int64)

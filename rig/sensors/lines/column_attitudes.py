@@ -1,4 +1,4 @@
-"""The columns of attitudes in an unknown log. Quaternions are read; matrices and angles are named, but not read."""
+"""Attitudes in an unknown log: quaternions are read; rotation matrices and angles are only reported."""
 
 import re
 from collections.abc import Sequence
@@ -20,7 +20,10 @@ OTHER_WORD = re.compile(r"gyr|acc|mag|temp|baro|press|lat(?!e)|lon|alt|vel|speed
 
 
 def describe_unread_attitudes(layout: TableLayout, matrices: Sequence[int], angles: Sequence[int]) -> list[str]:
-    """Return a sentence on rotation matrices or else on angles, if the log has some, and how to convert them."""
+    """Return sentences on how to convert the log's rotation matrices or, if it has none, its angles, to quaternions.
+
+    `matrices` and `angles` are the columns that contain them. The list is empty if there are neither.
+    """
     if matrices:
         first, last = layout.name(matrices[0]), layout.name(matrices[8])
         return [
@@ -46,7 +49,7 @@ def list_angles(layout: TableLayout) -> list[int]:
 
 
 def find_matrices(layout: TableLayout, values: Array) -> list[int]:
-    """Return the columns of rotation matrices: nine adjacent columns are a matrix, row by row or column by column."""
+    """Return the columns of rotation matrices. Nine adjacent columns are a matrix, row by row or column by column."""
     numbers, matrices = set(layout.numbers), list[int]()
     for start in layout.numbers:
         indices = [*range(start, start + 9)]
@@ -56,7 +59,7 @@ def find_matrices(layout: TableLayout, values: Array) -> list[int]:
 
 
 def _are_rotations(values: Array) -> bool:
-    """Return whether most rows (n, 9) are orthonormal matrices of three rows."""
+    """Return whether most rows of `values` (n, 9) are orthonormal matrices (3, 3), written row by row."""
     whole = values[np.isfinite(values).all(axis=1)]
     if len(whole) < 2:
         return False
@@ -68,9 +71,9 @@ def _are_rotations(values: Array) -> bool:
 def find_quaternion(layout: TableLayout, values: Array, matrices: Sequence[int]) -> dict[str, int]:
     """Return the columns of a quaternion by its components qw qx qy qz; empty if there is none.
 
-    The columns are found by their names, or else as four adjacent columns whose norm is 1. Columns of rotation matrices
-    are left out, because a matrix row next to a number near zero has this norm too, and so are columns whose headings
-    say something else.
+    The columns are found by their names, or else as four adjacent columns whose norm is 1. The columns of rotation
+    `matrices` are left out, because a matrix row next to a number near zero has this norm too. Columns whose headings
+    name another quantity are left out as well.
     """
     named: dict[str, int] = {}
     for index in layout.numbers:

@@ -18,9 +18,9 @@ LEAST_GRAVITY = 0.7  # fraction of 1 g that remains in an accelerometer's median
 
 
 def find_virtual(layout: TableLayout, values: Array, title: str) -> tuple[set[int], list[str]]:
-    """Return the columns that a program computed, as gravity or as acceleration without gravity, and why to omit them.
+    """Return the columns that a program computed (gravity, or acceleration without gravity), and why each is omitted.
 
-    `title`: the file's name, which counts for columns that are named by their axes alone.
+    `title` is the file's name. It shows what columns contain that are named only x, y or z.
     """
     kinds: dict[str, list[int]] = {}
     for index in layout.numbers:
@@ -48,9 +48,10 @@ def _has_gravity(values: Array) -> bool:
 def explain_unread(
     layout: TableLayout, values: Array, used: Collection[int | None], read: Collection[str | int]
 ) -> list[str]:
-    """Return a sentence on each triad of columns that is named like a sensor's axes but not `read`.
+    """Return a sentence on each triad of columns that is named like a sensor's axes but is not in `read`.
 
-    `used`: the columns with another meaning, which are no triads.
+    `read` are the columns that are read as a sensor's; `used` are the numbers of columns with another meaning, which
+    need no sentence.
     """
     columns: dict[tuple[str, str], list[int]] = {}
     for index in range(len(layout.headings)):
@@ -70,7 +71,10 @@ def explain_unread(
 
 
 def _explain_triad(layout: TableLayout, values: Array, triad: Sequence[int], sensor_read: str) -> str:
-    """Return why three columns are not read; `sensor_read`: the sensor of their kind that is read, or ""."""
+    """Return why three columns are not read.
+
+    `sensor_read` names the sensor whose readings have the same quantity and are read; "" if there is none.
+    """
     headings = layout.headings
     if texts := [headings[index] for index in triad if index not in layout.numbers]:
         return f"not all cells of {' '.join(texts)} are numbers"

@@ -73,7 +73,10 @@ def _divide_axis(words: list[str]) -> list[str]:
 
 
 def _strip_units(words: list[str]) -> list[str]:
-    """Return a heading's words up to the axis, without its unit; before a bare axis put the sensor with this unit."""
+    """Return a heading's words without the words of its unit, which follow the axis.
+
+    If only the axis is left, the kind of sensor that has this unit is put before it.
+    """
     axes = [position for position, word in enumerate(words) if word in AXES]
     if axes and axes[-1] < len(words) - 1 and all(word in UNIT_WORDS for word in words[axes[-1] + 1 :]):
         kind = {"rad": "gyro", "deg": "gyro", "dps": "gyro", "m": "acc", "t": "mag", "ut": "mag"}.get(
@@ -85,7 +88,7 @@ def _strip_units(words: list[str]) -> list[str]:
 
 
 def order_axes(indices: Sequence[int], names: Sequence[str]) -> list[int]:
-    """Return the columns, in the order x, y, z if these are their names, because some loggers write z first."""
+    """Return the columns; those that are named x, y, z are put in this order, because some loggers write z first."""
     axes = iter(sorted((index for index in indices if is_axis(names[index])), key=lambda index: names[index]))
     return [next(axes) if is_axis(names[index]) else index for index in indices]
 
@@ -106,6 +109,6 @@ def find_axis(name: str) -> tuple[str, str] | None:
 
 
 def mark_repeated(names: Sequence[str]) -> list[str]:
-    """Return the names with repeated ones marked, so that of two sensors of one kind the first is read."""
+    """Return the names, with a mark before repeated ones, so that of two sensors of one kind the first is read."""
     keys = [find_axis(name) or name for name in names]
     return [f"{REPEATED} {name}" if name and keys[index] in keys[:index] else name for index, name in enumerate(names)]

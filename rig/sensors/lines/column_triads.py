@@ -1,4 +1,4 @@
-"""Triads of an unknown log: named ones, and unnamed ones that gravity shows. The others are undetermined."""
+"""Triads of an unknown log: columns named as such, and unnamed columns that are recognized by their readings."""
 
 from collections.abc import Sequence
 
@@ -16,10 +16,10 @@ NAMED_OTHERWISE = "other"
 def guess_triads(
     names: tuple[str, ...], indices: Sequence[int], values: Array, still: Flags, rate_hz: float
 ) -> tuple[Guess, list[list[int]]]:
-    """Guess which columns of readings (n, k) at a given rate are triads of sensors, and their units.
+    """Guess which columns of readings (n, k), at `rate_hz`, are triads of sensors, and in which units.
 
     Return the guess, and the positions of the unnamed triads that remain undetermined. `indices` (k,) are the columns'
-    numbers in the file; `still` (n,) marks the rows at rest; if it marks none, all rows count as at rest.
+    numbers in the file. `still` (n,) marks the rows at rest; if it marks none, all rows count as at rest.
     """
     count = values.shape[1]
     still = still if still.any() else np.ones(len(values), dtype=np.bool_)

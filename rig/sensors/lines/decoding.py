@@ -154,7 +154,10 @@ class LineReader:
     def _match_checksums(
         raw: NDArray[np.uint8], text: NDArray[np.uint8], starts: NDArray[np.intp], ends: NDArray[np.intp]
     ) -> NDArray[np.bool_]:
-        """Return a mask of lines with a correct checksum `*hh` (XOR); blank it, and an initial `$` or `!` in `text`."""
+        """Return a mask of lines with a correct checksum `*hh` (XOR).
+
+        In `text`, replace these checksums and the `$` or `!` at the start of their lines by blanks.
+        """
         star = np.maximum(ends - 3, 0)
         high, low = _HEX[raw[ends - 2]], _HEX[raw[ends - 1]]
         body_starts = starts + np.isin(raw[starts], np.frombuffer(b"$!", np.uint8))
@@ -184,8 +187,8 @@ class LineReader:
     ) -> Array:
         """Return the numbers (m, columns) of the m lines that are `good`, have a right checksum and have all numbers.
 
-        `good` and `sum_ok` are masks of the lines; `good` is cleared in place for lines without all numbers. `lines`
-        are the positions of their starts and ends.
+        `lines` are the positions of all starts and all ends of lines; `good` and `sum_ok` are masks of the lines.
+        `good` is cleared in place for lines without all numbers.
         """
         line_starts, line_ends = lines
         number = np.concatenate([[False], classes == _NUMBER, [False]])

@@ -1,4 +1,4 @@
-"""The parser of a line with columns that hold no number: unused text, or a value that is not provided."""
+"""The parser of single lines in which some columns hold text that is not used, or no value."""
 
 import re
 from collections.abc import Mapping
@@ -20,7 +20,7 @@ _AROUND_KEYS = " \t,;{}[]()\"'|&"
 
 
 class TextFieldReader:
-    """A reader, set up by a section, of single lines that `LineReader` cannot parse as numbers."""
+    """The reader of single lines, in the form of a section `lines`, that `LineReader` cannot parse as numbers."""
 
     def __init__(self, section: LinesSection) -> None:
         self._columns = section.columns

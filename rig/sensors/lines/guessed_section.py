@@ -27,7 +27,7 @@ class StatedProperties:
 def section(
     shape: Shape, guess: Guess, port: str, baud: int, name: str = "imu", *, user: StatedProperties | None = None
 ) -> str:
-    """Return the YAML of the section `sensors`, with `?` for each unknown value, whose key `rig check` then reports."""
+    """Return the YAML of the section `sensors`. An unknown value is written as `?`, which `rig check` then reports."""
     user = user or StatedProperties()
     lines: dict[str, object] = {"columns": _format_list(guess.columns)}
     if shape.keys:

@@ -101,7 +101,7 @@ def guess(shape: Shape, still_until_s: float) -> Guess:
 def match_names(names: tuple[str, ...]) -> dict[int, str]:
     """Return the rig's column names for the names in a header, by their index; unknown names have no entry.
 
-    Headings of which several have one meaning have no entry either.
+    If several names have the same meaning, none of them has an entry.
     """
     names_by_index: dict[int, str] = {}
     for index, name in enumerate(names):
@@ -184,9 +184,9 @@ def _unit_of_time(steps: Array, interval_s: float) -> str | None:
 
 
 def find_triads(shape: Shape, guess: Guess, still: Flags, starts: Iterable[int] | None = None) -> None:
-    """Enter into the guess the unnamed triads of adjacent columns, as their norms at rest and in rotation show.
+    """Enter into the guess the unnamed triads of adjacent columns, recognized by their norms at rest and in rotation.
 
-    `starts`: the columns with which a triad may begin, all if None.
+    `starts` are the columns with which a triad may begin, all if None.
     """
     for start in range(shape.values.shape[1] - 2) if starts is None else starts:
         places = slice(start, start + 3)

@@ -59,9 +59,10 @@ class Counts:
 
 
 class LinesDevice:
-    """A device on a serial port or `socket://host:port`, until `close`. `on_values` runs on its thread.
+    """A device on a serial port or `socket://host:port`, which stays open until `close`.
 
-    Its errors are SensorErrors with names that begin with `lines_`; their messages name `sensor`.
+    A thread reads the port and calls `on_values`. Errors are SensorErrors with names that begin with `lines_`; their
+    messages name the configured `sensor`.
     """
 
     def __init__(
@@ -127,7 +128,10 @@ class LinesDevice:
 
     # -- the first lines -----------------------------------------------------------------------------------------
     def _look(self, timeout_s: float) -> float:
-        """Return the sample rate by the device's own time, NaN if it sends none. Raise SensorError."""
+        """Wait for samples; return their rate by the device's own time, NaN if it sends none.
+
+        Raise SensorError if no sample comes within `timeout_s`, or if the rate is not the configured one.
+        """
         has_enough = self.own_port.wait(self._has_enough, timeout_s)
         if not has_enough and not self.counts.samples:
             raise self._why_no_sample(timeout_s)
@@ -143,7 +147,7 @@ class LinesDevice:
         return rate_hz
 
     def _has_enough(self) -> bool:
-        """Return whether the samples suffice to judge the rate: few at a low rate, more with coarse times."""
+        """Return whether the samples suffice to judge the rate. At a low rate few suffice; coarse times need more."""
         if self._section.time is None:
             return self.counts.samples >= 3
         is_long_enough = self.counts.samples >= 5 and self._span_s() >= MIN_RATE_S
@@ -151,7 +155,7 @@ class LinesDevice:
 
     @property
     def _rate_error(self) -> float:
-        """The relative error of the rate due to coarse times; 0 if the times are fine."""
+        """The relative error of the measured rate that the steps of coarse times cause; 0 if the times are fine."""
         step_s, span_s = self.time_step_s, self._span_s()
         if not is_coarse(step_s, self._rate_hz):
             return 0.0

@@ -126,7 +126,10 @@ class _Printed:
     zero: float = 0.0
 
     def readings(self, values: Array, channel: Channel) -> Array:
-        """Return the channel's readings (n,) or (n, 3) in `values` (n, columns); a stated quantity is constant."""
+        """Return the channel's readings (n,) or (n, 3) in `values` (n, columns).
+
+        If the lines do not contain the channel, its readings are the constant that the configuration states.
+        """
         if not self.columns:
             return np.full(len(values), channel.offset)
         return values[:, self.columns].reshape(len(values), *channel.measures.shape) * self.size + self.zero
@@ -170,8 +173,8 @@ def _make_readers(
 def stamp_std_s(lines: LinesSection, rate_hz: float, step_s: float = 0.0) -> float | None:
     """Return the standard uncertainty of a sample's time on the clock that stamps it; None if it is negligible.
 
-    The device sends its time in steps of `step_s`. If this is 0, the step is the time's unit, or is neglected if the
-    unit is the second.
+    `step_s` is the step of the time in the device's lines. If it is 0, one unit of this time is taken as its step,
+    except if the unit is the second: then the step is neglected.
     """
     if lines.clock == "arrival":
         return 1e-3 * lines.jitter_ms / 3**0.5

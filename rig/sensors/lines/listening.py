@@ -49,7 +49,10 @@ def listen(
 
 
 def _find_speed(port: str, tell: Callable[[str], None]) -> int:
-    """Return, and `tell`, the first usual baud rate with text as input. Raise SensorError `lines_wrong_baud_rate`."""
+    """Return the first usual baud rate at which text arrives, and report it by `tell`.
+
+    Raise SensorError `lines_silent`, `lines_wrong_baud_rate`.
+    """
     if port.startswith("socket://"):
         return USUAL_BAUDS[0]  # a socket has no baud rate
     has_input = False
@@ -70,7 +73,7 @@ def _find_speed(port: str, tell: Callable[[str], None]) -> int:
 
 
 def _read_at(port: str, baud: int) -> bytes:
-    """Return the bytes that arrive at `baud` within TRIED_S, about 2000 at most; empty if the port fails."""
+    """Return the bytes that arrive at `baud` within `BAUD_TRIAL_S`, about 2000 at most; empty if the port fails."""
     serial = open_device_port(port, baud)
     try:
         serial.read()  # discard input received at another speed

@@ -113,7 +113,7 @@ def guess_columns(layout: TableLayout, values: Array, time: Array | None, title:
 
 
 def _insert_time(layout: TableLayout, values: Array, time: Array) -> Array:
-    """Return `values` with `time` in the layout's column of time, whose values are NaN."""
+    """Return `values` with `time` entered into the layout's column of time, which so far contains NaN."""
     return np.where(np.arange(values.shape[1]) == layout.time, time[:, None], values)
 
 
@@ -187,7 +187,10 @@ def _list_others(layout: TableLayout, entries: Sequence[ColumnEntry]) -> list[st
 
 
 def find_still(values: Array, rate_hz: float) -> NDArray[np.bool_]:
-    """Return a mask (n,) of rows at rest, in whose block each column scatters little more than in its quiet blocks."""
+    """Return a mask (n,) of rows at rest. They are marked in blocks of `BLOCK_S`.
+
+    A block is at rest if each column scatters little more in it than in the quietest blocks of the same column.
+    """
     width = max(int(BLOCK_S * rate_hz), 5)
     count = len(values) // width
     if count < 2:

@@ -46,7 +46,7 @@ class Shape:
     - values (n, columns): the numbers, NaN if missing or text.
     - arrived_s (n,): the samples' times of arrival.
     - decimals (columns,): the decimals of a column, -1 if they vary.
-    - others: the number of other lines.
+    - others: the number of lines that do not have the pattern.
     """
 
     separator: str
@@ -161,7 +161,10 @@ def _split_by(sign: str, name: str, checked: Sequence[_CheckedLine]) -> Shape | 
 def _find_columns(
     name: str, alike: Sequence[_CheckedLine], fields: list[list[str]], others: Sequence[str]
 ) -> Shape | None:
-    """Return the shape of the lines `alike`, with a header from `others`; None with fewer than three number columns."""
+    """Return the shape of the lines `alike`, whose header is sought in the lines `others`.
+
+    Return None if fewer than three columns hold numbers.
+    """
     if not any(row[-1] for row in fields):
         fields = [row[:-1] for row in fields]
     count = len(fields[0])

@@ -29,7 +29,7 @@ class Stamper:
     """The numbers and times of one stream's samples, in µs of its clock.
 
     - `section`, `rate_hz`: the configuration.
-    - `where`: the device in messages.
+    - `where`: the device's name in messages.
     - `step_s`: the step of the device's time; a coarse time is smoothed.
     - `lost`: the number of samples that did not arrive.
     - `odd`: the number of samples left out because their time or number goes back or jumps by more than 2 s.
@@ -53,10 +53,10 @@ class Stamper:
     def stamp(
         self, values: Array, skipped: int, host_time_s: float
     ) -> tuple[NDArray[np.bool_], NDArray[np.int64], NDArray[np.int64]]:
-        """Return a mask (n,) of the m valid rows of `values` (n, columns), with their numbers (m,) and times (m,), µs.
+        """Return a mask (n,) of the rows of `values` (n, columns) that are valid, and their numbers and times (m,), µs.
 
-        Numbers count lost samples too, from 0. The rows arrived at `host_time_s`, after `skipped` rejected lines. Raise
-        SensorError `lines_time_jumped`.
+        Numbers begin with 0 and count lost samples too. The rows arrived at `host_time_s`, after `skipped` rejected
+        lines. Raise SensorError `lines_time_jumped`.
         """
         if not len(values):
             return np.zeros(0, np.bool_), np.zeros(0, np.int64), np.zeros(0, np.int64)
@@ -187,7 +187,7 @@ class Stamper:
 
     # -- times ---------------------------------------------------------------------------------------------------
     def _add_late(self, steps: NDArray[np.int64], host_time_s: float) -> NDArray[np.int64]:
-        """Return the `steps`; if lines come so late that samples must have been lost, the first step includes these."""
+        """Return the `steps`, the first increased by the number of samples that were lost, if the lines are late."""
         if "sequence" in self.section.columns or self._smoothed is None:
             return steps
         late_s = host_time_s - (self._host_began_s or 0.0) - self._smoothed.predict_s(int(steps.sum()))

@@ -31,7 +31,11 @@ OnMessages = Callable[[list[tuple[Any, bool]], float], None]
 
 @dataclass(frozen=True, slots=True)
 class Autopilot:
-    """An autopilot: its number in MAVLink's network, its firmware (MAV_AUTOPILOT), version, unique number."""
+    """An autopilot's identity.
+
+    `system` and `component` are its address in a MAVLink network, `firmware` is the number of its firmware
+    (MAV_AUTOPILOT), `uid` is its unique number.
+    """
 
     system: int
     component: int
@@ -46,9 +50,10 @@ class Autopilot:
 
 
 class AutopilotLink:
-    """An autopilot at a port, until `close`. `on_messages` gets the messages in `wanted`, on the reader's thread.
+    """The link to an autopilot at a port, which stays open until `close`.
 
-    Its errors are SensorErrors; their messages name `sensor`, as the configuration does.
+    A thread reads the port and calls `on_messages` with the messages in `wanted`. Errors are SensorErrors; their
+    messages name the configured `sensor`.
     """
 
     def __init__(
@@ -95,8 +100,8 @@ class AutopilotLink:
     def parameters(self, needed: Iterable[str], others: Iterable[str] = ()) -> Mapping[str, AutopilotParameter]:
         """Return the parameters, `needed` and `others`, that the autopilot sends on request.
 
-        Requests are repeated a few times, and until the time-out while a needed parameter is missing. Raise SensorError
-        `autopilot_silent` if no parameter comes.
+        A request is repeated until it is answered: for `needed` parameters until the time-out, for others a few times.
+        Raise SensorError `autopilot_silent` if no parameter comes.
         """
         needed = set(needed)
         names = needed | set(others)
@@ -147,7 +152,7 @@ class AutopilotLink:
             )
 
     def request(self, message: str) -> None:
-        """Request a message once. An autopilot without such requests ignores it."""
+        """Request a message once. An autopilot that does not know this request ignores it."""
         number = getattr(self._mavlink, f"MAVLINK_MSG_ID_{message}")
         self._send(self._command_message(REQUEST_MESSAGE, number, 0.0))
 
@@ -263,7 +268,7 @@ class AutopilotLink:
                 self.own_port.news.notify_all()
 
     def _is_from_autopilot(self, message: Any) -> bool:
-        """Return whether the selected autopilot, the first one with a heartbeat, sent a message."""
+        """Return whether a message came from the selected autopilot, which is the first one with a heartbeat."""
         source = (message.get_srcSystem(), message.get_srcComponent())
         if self.autopilot is None and message.get_type() == "HEARTBEAT":
             if message.autopilot in FIRMWARES:

@@ -209,7 +209,7 @@ class MavlinkSource:
 def check_parameters(
     link: AutopilotLink, name: str, section: SensorSection
 ) -> tuple[Mapping[str, float], list[SensorError]]:
-    """Return the parameter values of the configured IMU, and the problems of reading it."""
+    """Return the parameter values of the configured IMU, and the problems for which it cannot be used."""
     line = mavlink_section(section)
     identity = link.identity
     names = parameter_names(identity.firmware, line)

@@ -1,4 +1,4 @@
-"""A board's orientation in its vehicle, by the number in both firmwares (MAV_SENSOR_ORIENTATION). Pure."""
+"""A board's orientation in its vehicle, by its number in MAVLink, MAV_SENSOR_ORIENTATION. Pure."""
 
 from functools import cache
 
@@ -19,7 +19,10 @@ RIGHT_ANGLES = {
 
 @cache
 def board_rotation(number: float) -> Array | None:
-    """Return the rotation (3, 3) from the board's axes to the vehicle's, None if an entry is neither 0 nor ±1."""
+    """Return the rotation (3, 3) from the board's axes to the vehicle's for an orientation by its number.
+
+    Return None unless the number stands for an orientation of right angles.
+    """
     angles = RIGHT_ANGLES.get(int(number)) if number == int(number) else None
     if angles is None:
         return None

@@ -53,7 +53,10 @@ class ParameterChange:
         return json.dumps({**head, **sets}, indent=2) + "\n"
 
     def keep(self) -> None:
-        """Write the new file that restores the old parameters. Raise Refused `autopilot_not_kept`."""
+        """Write the change to the new file `backup`, which can restore the old parameters.
+
+        Raise Refused `autopilot_not_kept`.
+        """
         try:
             _write(self.backup, self.serialize(), exclusive=True)
         except OSError as error:
