@@ -73,7 +73,7 @@ class ArmMotionSource:
 
     @property
     def tick_s(self) -> float:
-        """The duration of a tick, s, which is 2 ms on the controller's clock."""
+        """The duration of a tick, s. It is 2 ms on the controller's clock, which has an error."""
         return self.arm.tick_s
 
     @property
@@ -102,7 +102,7 @@ class ArmMotionSource:
         return self.arm.motion_at(time_s)
 
     def frames_at(self, time_s: float) -> Frames:
-        """Return, for the base and each link up to the flange, the rotation to base axes (rows) and the position, m."""
+        """Return the frames of base and links, the flange last: rotation matrix to the base's axes, and position, m."""
         return self.arm.frames_at(time_s)
 
 

@@ -10,7 +10,7 @@ from rig.config.world.faulty import SimulatedFaultySection
 
 
 class FrozenGyroscope:
-    """A simulated gyroscope with one axis that freezes; `read` is as in `Gyroscope`."""
+    """A simulated gyroscope with one axis that freezes. It is used like a `Gyroscope`."""
 
     def __init__(self, gyroscope: Gyroscope, section: SimulatedFaultySection) -> None:
         self._gyroscope, self._section = gyroscope, section

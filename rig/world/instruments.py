@@ -33,7 +33,8 @@ class InstrumentMount:
     """The place of an instrument in the simulated laboratory, with its port.
 
     - kind: its name in control requests.
-    - build: returns the instrument, switched on at a virtual time, s; `build` itself holds the non-volatile memory.
+    - build: returns the instrument, switched on at a virtual time, s. Non-volatile memory is kept by this function,
+      because the instrument exists only while it has power.
     - pty: whether its port is also a pseudo-terminal.
     - bit_error_rate: the fraction of wrong bits on its line when the world starts.
     - stolen: the fraction of its bytes that another program on the port reads, when the world starts.

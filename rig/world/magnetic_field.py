@@ -23,7 +23,10 @@ Frames = Sequence[tuple[Rotation, Vector]]  # rotation and position (m) of the b
 
 @dataclass(frozen=True, slots=True)
 class Room:
-    """Flux density (T) at the base's origin when the world begins, its gradient (rows, T/m) and its drift (T/s)."""
+    """The field of the room: flux density at the base's origin when the world begins, its gradient, its steady drift.
+
+    Row i of `gradient_t_m` is the gradient of component i of the flux density.
+    """
 
     flux_density_t: Vector
     gradient_t_m: Rotation = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))

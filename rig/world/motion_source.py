@@ -45,5 +45,8 @@ class MotionSource(Protocol):
         ...
 
     def frames_at(self, time_s: float) -> Frames:
-        """Return rotation matrix and position (m) of every body: the fixed body first, that with the sensors last."""
+        """Return the frames of all bodies: the fixed body first, that with the sensors last.
+
+        A frame is a rotation matrix to the axes of the fixed body, row by row, and a position in these axes, m.
+        """
         ...

@@ -67,10 +67,10 @@ class SimulatedOperator:
     def instruct(
         self, say: str, face: Face, turns: int = 0, *, again: bool = False, mistake: Mistake | None = None
     ) -> None:
-        """Replace the pending instruction, which is carried out with the `mistake`, drawn at random if None.
+        """Give the operator an instruction, which replaces a pending one.
 
-        Raise ValueError for an unknown instruction. An item that already lies as requested is left alone, unless
-        `again`.
+        It is carried out with the given `mistake`, or with one drawn at random if None. An item that already lies as
+        requested is left alone, unless `again`. Raise ValueError for an unknown instruction.
         """
         if face not in FACES or say not in ("lay", "turn"):
             raise ValueError(f"there is no instruction {say!r} of a side {face!r}")
@@ -123,6 +123,6 @@ class SimulatedOperator:
         return now
 
     def frames_at(self, time_s: float) -> Frames:
-        """Return the rotation matrix, row by row, and the position (m) of the table and of the item."""
+        """Return the frames of the table and of the item."""
         x, y, z = map(tuple, self._hand.motion_at(np.array([time_s])).attitude[0].tolist())
         return [(ORIENTATION, ORIGIN), ((x, y, z), ORIGIN)]

@@ -200,7 +200,10 @@ class World:
 
     # -- the truth -------------------------------------------------------------------------------------------------
     def write_truth(self, windows: Mapping[str, Any]) -> None:
-        """Write into the world's file what was true in a run's windows (`truth_document`). Raise ValueError if not."""
+        """Write the truth over the windows of a run (`truth_document`) into the world's file.
+
+        Raise ValueError if this world has no such file, if its board is heated, or if the file cannot be written.
+        """
         if self._truth_file is None or self.laboratory.body is not None:
             raise ValueError("this world was given no file for its truth, or is heated")
         document = truth_document(self._truth, windows, self.clock.time_s)

@@ -35,9 +35,10 @@ SENSORS_UPDATED, TEMPERATURE_UPDATED = 0x3F, 0x1000
 
 @dataclass(slots=True)
 class AutopilotFaults:
-    """Faults that a test can set: the fractions of messages `lost` and `doubled`.
+    """Faults that a test can set.
 
-    `slowest`: the sent message rate as a fraction of the requested one. A `deaf` autopilot ignores all messages.
+    `lost` and `doubled` are fractions of the sent messages, `slowest` is the sent message rate as a fraction of the
+    requested one. A `deaf` autopilot ignores all messages; a `camera` reports that it is no autopilot.
     """
 
     lost: float = 0.0

@@ -22,7 +22,10 @@ def build_autopilot_mounts(config: RigConfig, world: WorldSection) -> dict[str, 
 
 
 def _mount(config: RigConfig, world: WorldSection, imus: dict[int, str], baud: int) -> InstrumentMount:
-    """Return an autopilot whose `imus` are sensors by IMU number; an IMU without a sensor moves as the first sensor."""
+    """Return an autopilot with the configured sensors `imus`, by the numbers of its IMUs.
+
+    An IMU of the autopilot that is not among them moves as the first of them.
+    """
     sections = (world.sensors[name].autopilot for name in config.sensors if name in imus.values())
     section = next((section for section in sections if section is not None), SimulatedAutopilotSection())
     try:

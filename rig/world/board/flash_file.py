@@ -21,9 +21,10 @@ RAM, FLASH = range(0x2000_0000, 0x2001_0000), range(0x0800_0000, 0x0804_0000)
 
 
 def open_flash(path: Path | None) -> FlashMemory:
-    """Return a flash with the shipped program; a given `path` has its stored data and receives every change.
+    """Return a flash with the shipped program.
 
-    Raise Refused `flash_file`.
+    If a `path` is given, the other stored data are read from this file, and every change is written to it. Raise
+    Refused `flash_file`.
     """
     if path is None:
         return FlashMemory(read_firmware("bin"))

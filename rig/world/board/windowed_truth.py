@@ -44,7 +44,7 @@ class SimulatedTruth:
         return -np.asarray(self._rates(name, windows_s, 0.0).mean(axis=0))
 
     def acceleration_scale(self, name: str, windows_s: Windows) -> np.ndarray:
-        """Return the scale factors (3,) of an accelerometer between 1 g up and 1 g down."""
+        """Return the scale factors (3,) of an accelerometer, from plus and minus 1 g along each axis."""
         up, down = (self._accelerations(name, windows_s, sign * STANDARD_GRAVITY_M_S2) for sign in (1, -1))
         mean: np.ndarray = np.mean(2 * STANDARD_GRAVITY_M_S2 / (up - down), axis=0)
         return mean

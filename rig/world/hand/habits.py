@@ -81,7 +81,7 @@ Action = FlipAction | TurnAction | WaitAction
 
 @dataclass(frozen=True, slots=True)
 class Habits:
-    """How a hand moves and lays down a body. Values that are drawn for every action are standard deviations.
+    """The habits of a hand that moves a body and lays it down. Values drawn for every action are standard deviations.
 
     `tilt_mrad`: repeatability of a face put down again; `closure_mrad`: heading error after a turn against an edge;
     `heading_mrad`: heading error after a flip; `faces_mrad`: the faces' deviation from right angles; `table_mrad`: the

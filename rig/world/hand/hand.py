@@ -18,8 +18,9 @@ DROP_M_S2 = 160.0  # peak specific force of a drop
 class HandMotion:
     """The motion sensed on the body at n times, in body axes.
 
-    Rates, specific forces and the bias jumps since falls are arrays (n, 3), attitudes (n, 3, 3) rotate from the body to
-    the room, and `lost` (n,) marks the readings that are lost.
+    Rates, specific forces and biases are arrays (n, 3); a bias is the sum of the jumps that falls of the body have
+    caused so far. Attitudes (n, 3, 3) rotate from the body to the room, and `lost` (n,) marks the readings that are
+    lost.
     """
 
     rate_rad_s: Array

@@ -36,7 +36,7 @@ class SimulatedBus:
         return next((baud for servo in self.servos if (baud := servo.baud_rate) is not None), None)
 
     def receive(self, data: bytes) -> None:
-        """Receive bytes from the host, of which the last one ends now."""
+        """Receive bytes from the host. The last of them ends now."""
         now_s = self._now()
         if self.line.echo:
             self._send(now_s, data)
@@ -45,7 +45,7 @@ class SimulatedBus:
             self._answer(packet, now_s)
 
     def advance(self) -> None:
-        """Simulate every servo until now. No watchdog counts a time in which this process was suspended."""
+        """Simulate every servo until now. Time in which this process was suspended does not count for the watchdogs."""
         now_s = self._now()
         stalled_s, self._advanced_s = now_s - self._advanced_s, now_s
         for servo in self.servos:

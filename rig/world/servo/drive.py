@@ -61,7 +61,7 @@ class Drive:
         self.forget_turns(time_s)
 
     def forget_turns(self, time_s: float) -> None:
-        """Reset the count of revolutions to zero, as the servo does."""
+        """Reset the count of revolutions to zero."""
         self._turns_rad = whole_turns(self.shaft.encoder_at(time_s))
 
     def is_moving(self, time_s: float) -> bool:

@@ -89,7 +89,7 @@ class SimulatedServo:
             self.drive.advance(time_s)
 
     def extend_watchdog(self, duration_s: float) -> None:
-        """Extend the watchdog's time by `duration_s`, in which no client could be heard."""
+        """Extend the watchdog's time by `duration_s`, in which this process was suspended and heard no client."""
         self.drive.fed_s += duration_s
 
     def is_moving(self, time_s: float) -> bool:

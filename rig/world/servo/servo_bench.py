@@ -100,7 +100,7 @@ class ServoBench:
         return propagate(find_base_motion(self._site), [(cos(angle), sin(angle))], (rate,), (change,), (SHAFT,))
 
     def frames_at(self, time_s: float) -> Sequence[tuple[Rotation, Vector]]:
-        """Return the rotation matrix, row by row, and the position (m) of the base and of the shaft."""
+        """Return the frames of the servo's base and of its shaft."""
         angle, origin = self.servo.angle_at(time_s), (0.0, 0.0, 0.0)
         identity = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
         c, s = cos(angle), sin(angle)

@@ -28,7 +28,7 @@ def build_package(kind: str, payload: bytes) -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class InputRecipe:
-    """An input recipe: names of the values of a data package, and their destinations."""
+    """An input recipe: the layout of a data package, and the name, size and destination of each of its values."""
 
     layout: struct.Struct
     fields: tuple[tuple[str, int, Put], ...]  # name, number of values, destination

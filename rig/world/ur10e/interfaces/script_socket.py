@@ -62,7 +62,10 @@ def compile_program(robot: Robot, lines: list[str]) -> Program:
 
 
 def _parse_register_offset(text: str) -> int:
-    """Return the register offset set in `text`, else 0. Raise `ProgramError` for one that rtde_control never uses."""
+    """Return the register offset that `text` sets, 0 if it sets none.
+
+    Raise `ProgramError` for an offset that rtde_control never uses.
+    """
     match = re.search(r"reg_offset_int\s*=[^\n]*\n\s*(\d+)", text)
     offset = int(match.group(1)) if match else 0
     if offset not in REGISTER_OFFSETS:

@@ -26,9 +26,10 @@ CB3: Version = (3, 15, 8, 0)
 class ArmModel:
     """One arm model.
 
-    `limit_rad` and `speed_rad_s`: greatest joint angles, to either side, and speeds. `home_deg` and `polyscope`:
-    initial pose and software version, if the configuration has none. `name` is the dashboard's. `encoder_step_rad`: the
-    encoders' step, for a UR3 of the CB3 series from its logs; the e-Series' step is only known to be finer.
+    `limit_rad` and `speed_rad_s`: the joints' greatest angles, to either side, and greatest speeds. `home_deg` and
+    `polyscope`: initial pose and software version, if the configuration states none. `name`: the model's name at the
+    dashboard. `encoder_step_rad`: the encoders' step, for a UR3 of the CB3 series from its logs; the e-Series' step is
+    only known to be finer.
     """
 
     robot_type: int

@@ -1,6 +1,7 @@
 """Forward kinematics of the simulated flange, independent of the rig's.
 
-Plain floats, because the sensors need them several hundred times per simulated second.
+Plain floats, because the sensors need them several hundred times per simulated second. A frame is a rotation matrix,
+row by row, from a body's axes to the base's, and the position (m) of the body in the base's axes.
 """
 
 from collections.abc import Iterator, Sequence
@@ -25,7 +26,7 @@ def flange_rate(q_rad: Sequence[float], qd_rad_s: Sequence[float], links: Links 
 
 
 def frames(q_rad: Sequence[float], links: Links = NOMINAL) -> Iterator[tuple[Rotation, Vector]]:
-    """Yield rotation (rows) and position (m) in the base frame of the base and then of each link, the flange last."""
+    """Yield the frames of the base and then of each link, the flange last."""
     rotation: Rotation = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     position: Vector = (0.0, 0.0, 0.0)
     yield rotation, position
@@ -41,7 +42,7 @@ def frames(q_rad: Sequence[float], links: Links = NOMINAL) -> Iterator[tuple[Rot
 
 
 def rotate(rotation: Rotation, vector: Vector) -> Vector:
-    """Return the vector rotated by `rotation` (rows)."""
+    """Return the vector multiplied by the matrix `rotation`."""
     x, y, z = vector
     (a, b, c), (d, e, f), (g, h, i) = rotation
     return a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
@@ -54,24 +55,24 @@ def _product(a_rotation: Rotation, b_rotation: Rotation) -> Rotation:
 
 
 def flange_frame(q_rad: Sequence[float], links: Links = NOMINAL) -> tuple[Rotation, Vector]:
-    """Return rotation (rows) and position (m) of the flange in the base frame."""
+    """Return the flange's frame: its rotation to the base's axes, and its position there, m."""
     *_, flange = frames(q_rad, links)
     return flange
 
 
 def flange_pose(q_rad: Sequence[float], links: Links = NOMINAL) -> tuple[float, ...]:
-    """Return position (m) and rotation vector (rad) of the flange in the base frame, which UR calls a pose."""
+    """Return the flange's pose in the base frame, as UR writes it: position (m), then rotation vector (rad)."""
     rotation, position = flange_frame(q_rad, links)
     return (*position, *rotation_vector(rotation))
 
 
 def rotate_pose(pose: Sequence[float], turn: Rotation) -> tuple[float, ...]:
-    """Return `pose` with its axes rotated by the rotation vector `turn`, rad, about the same origin."""
+    """Return `pose` (m, rotation vector rad) with its axes rotated by the matrix `turn`; its origin is unchanged."""
     return (*pose[:3], *rotation_vector(_product(rotation_from_vector(pose[3:]), turn)))
 
 
 def compose_poses(frame: Sequence[float], pose: Sequence[float]) -> tuple[float, ...]:
-    """Return a `pose` given in `frame` in the base frame, as `pose_trans` of URScript does."""
+    """Return the pose in the base frame of a `pose` that is given in `frame`, as `pose_trans` of URScript does."""
     rotation = rotation_from_vector(frame[3:])
     position = (
         origin + sum(turn * coordinate for turn, coordinate in zip(row, pose[:3], strict=True))
@@ -81,7 +82,7 @@ def compose_poses(frame: Sequence[float], pose: Sequence[float]) -> tuple[float,
 
 
 def rotation_vector(r: Sequence[Sequence[float]]) -> Vector:
-    """Return the rotation vector (rad) of a rotation matrix (rows)."""
+    """Return the rotation vector, rad, of a rotation matrix."""
     cosine = max(-1.0, min(1.0, (r[0][0] + r[1][1] + r[2][2] - 1.0) / 2.0))
     angle = acos(cosine)
     x, y, z = r[2][1] - r[1][2], r[0][2] - r[2][0], r[1][0] - r[0][1]
@@ -97,7 +98,7 @@ def rotation_vector(r: Sequence[Sequence[float]]) -> Vector:
 
 
 def rotation_from_vector(vector: Sequence[float]) -> Rotation:
-    """Return the rotation matrix (rows) of a rotation vector (rad), by Rodrigues' formula."""
+    """Return the rotation matrix of a rotation vector, rad, by Rodrigues' formula."""
     angle = sqrt(sum(component * component for component in vector))
     if angle == 0.0:
         return (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)

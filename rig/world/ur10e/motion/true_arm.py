@@ -100,7 +100,7 @@ class TrueArm:
         return now
 
     def frames_at(self, time_s: float) -> list[tuple[Rotation, Vector]]:
-        """Return rotation (rows) and position (m) of the base and of each link, the flange last, in the base frame."""
+        """Return the frames of base and links, the flange last: rotation matrix to the base's axes, and position, m."""
         q, _, _ = self._joints_at(time_s * self._speed)
         return list(frames(q, self._links))
 
