@@ -54,8 +54,8 @@ def store_calibrations(
 def calibration_of(solved: SensorSolution, entry: OverTemperatureEntry | None = None) -> Calibration:
     """Return a sensor's solution as a record for the board, with the present time.
 
-    If `entry` is a calibration over temperature, the record has its polynomials. Raise Refused `not_in_result` without
-    a temperature.
+    If `entry` is a calibration over temperature, the record has its polynomials. Raise Refused `not_in_result` if the
+    temperature during the calibration is not known.
     """
     if solved.temperature_c is None:
         raise Refused(

@@ -22,7 +22,7 @@ MAX_EXIT_S = 5.0
 
 
 class Lookout:
-    """A listener that wakes the thread of the analysis."""
+    """A listener to the run's events that wakes the thread of the analysis."""
 
     def __init__(self) -> None:
         self.wanted = threading.Event()

@@ -40,7 +40,7 @@ class PageHistory:
         self._points.append((time_s, values))
 
     def clear(self) -> None:
-        """Remove all points: another movement begins."""
+        """Remove all points, because another movement begins."""
         self.first = self.end
         self._points.clear()
 

@@ -144,7 +144,7 @@ def _cut_at(run: RunData, time_s: float) -> RunData:
 
 
 def _progress(done: _Done, count: int, state: State, *, time_s: float, start_s: float, end_s: float) -> Progress:
-    """Return the progress, at `time_s`, of a run of `count` steps from `start_s` to `end_s` (controller's times)."""
+    """Return the progress at `time_s` in the step `done`, one of `count` steps of a run from `start_s` to `end_s`."""
     took_s = done.end_s - done.start_s
     return Progress(
         number=done.number,

@@ -33,7 +33,7 @@ class Look:
 def observation_row(sensor: str, observation: Observation) -> Row:
     """Return the row of a revolution averaged by the host: the mean readings, and the mean speed of the turn.
 
-    `along` is the fraction of the speed about the sensor axis that is nearest to the axis of the turn.
+    Its entry `along` is the fraction of the speed about the sensor axis that is nearest to the axis of the turn.
     """
     average = observation.average
     return {
@@ -109,7 +109,7 @@ def _dwell_rows(dwells: Attempts[QuantityInDwell, ReadAtRest]) -> list[Row]:
 
 
 def _parameters_so_far(name: str, partial: PartialGyroscope) -> Row:
-    """Return the row of a partial result: the solution with U, or else the bias at rest with what is missing."""
+    """Return the row of a partial result: the solution with U or, without one, the bias at rest and what is missing."""
     if (solution := partial.solution) is not None:
         u = (COVERAGE_FACTOR * np.sqrt(np.diag(solution.covariance))).tolist()
         bias, scale = AxisValues(solution.bias_rad_s.tolist(), u[3:]), AxisValues(solution.scale.tolist(), u[:3])

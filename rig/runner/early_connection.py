@@ -17,9 +17,10 @@ Connecting = Callable[[OnState, Path], AbstractContextManager[Turner]]
 
 
 class EarlyConnection:
-    """A connection by `connect`, logged in `log`, made before the run that takes it over.
+    """The connection of the next run's turner, made before this run begins.
 
-    If it fails or is lost, the run connects by itself and reports the error.
+    `connect` makes the connection, with `log` as the file for a client's output. If it fails or is lost, the run
+    connects by itself and reports the error.
     """
 
     def __init__(self, connect: Connecting, log: Path) -> None:
@@ -33,7 +34,10 @@ class EarlyConnection:
 
     @contextmanager
     def connect_turner(self, on_state: OnState, log: Path) -> Iterator[Turner]:
-        """Provide the turner of a run, as its kind connects it; `on_state` receives every state from now on."""
+        """Provide the turner of a run: the one connected early or, without one, a newly connected one.
+
+        `on_state` receives every state from now on.
+        """
         connection, self._next = self._next, None
         with ExitStack() as stack:
             turner = None if connection is None else connection.hand_over(stack, on_state)
@@ -66,7 +70,7 @@ class _Connection:
         self._on_state(state)
 
     def hand_over(self, stack: ExitStack, on_state: OnState) -> Turner | None:
-        """Return the turner if it is connected without fault, else None; `stack` closes it."""
+        """Return the turner if it is connected without fault, else None. It is disconnected when `stack` closes."""
         self._thread.join()
         if self._turner is None:
             return None

@@ -32,7 +32,8 @@ class EndingEarly:
     - `plan`: the remaining motions of the run.
     - `sweeps`, `repeats`: numbers of sweeps and repeats in the complete run.
     - `path`: the file of this recording.
-    - `earlier`: the run's recordings before an interruption; after complete repeats, the run may end before any motion.
+    - `earlier`: the run's recordings before an interruption. If they end with a complete repeat, this run may end
+      before its first motion.
     """
 
     wanted: TargetUncertainty

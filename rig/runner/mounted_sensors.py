@@ -45,10 +45,10 @@ class Memory:
 
 @dataclass(frozen=True, slots=True)
 class MountedSensor:
-    """A sensor of this run: its name, its part, and its board (None: a port of its own).
+    """A sensor of this run: its name, its part, and its board, None if the sensor has a port of its own.
 
-    `last`: the last calibration of its serial number. `other_board`: the last calibration on a board; None if there is
-    none, or if it was made on the present board.
+    `last`: the last calibration of its serial number. `other_board`: the last such calibration on any board, None if
+    that is the present board, or if there is no board now or then.
     """
 
     name: str

@@ -222,7 +222,7 @@ class Rig:
             self._resting_rad_s[readings.name] = readings.rates_rad_s.mean(axis=0)
 
     def _collect_readings(self, lasting_s: float, watch: Callable[[], None]) -> list[GyroscopeReadings]:
-        """Return the gyroscopes' readings since `keep` once they span `lasting_s`. Raise Fault `no_samples`."""
+        """Return the gyroscopes' readings since the latest `keep` once they span `lasting_s`. Raise `no_samples`."""
         acquisition = self.devices.acquisition
         sensors = {name: sensor for name, sensor in self.recording.sensors.items() if sensor.measures(RATE)}
 
@@ -306,7 +306,10 @@ class Rig:
         return self.early.skips(motion)
 
     def _observe(self, sweep: Sweep) -> None:
-        """Let the board average the sweep, whose window is computed in seconds; meanwhile control a heater, if any."""
+        """Let the board average the sweep's revolution.
+
+        To compute when the revolution began and ended takes seconds; meanwhile a heater, if any, is controlled.
+        """
         if self.onboard is None:
             return
         if self.warming is None:
@@ -341,7 +344,7 @@ class Rig:
         self._done.add(dwell.index)
 
     def _wait(self, until: Callable[[], bool], at_most_s: float, watch: Callable[[], None]) -> bool:
-        """Stand still, calling `watch`, until `until` is true; return False after `at_most_s` of controller time."""
+        """Stand still, calling `watch`, until `until` returns True; return False after `at_most_s` of arm time."""
         turner = self.devices.turner
         began_s = turner.latest.time_s
         while not until():

@@ -49,7 +49,7 @@ class Resumption:
 
 
 def resumption(earlier: Sequence[RunData], settings: RunSettings, script: ScriptFile) -> Resumption:
-    """Return the valid steps of an interrupted run: dwells, and sweeps that the board has also averaged.
+    """Return the valid steps of an interrupted run: dwells, and sweeps that a board, if there is one, has averaged too.
 
     A sweep that contradicts the others is not valid. Steps are identified by index, so script and movement must be the
     same. Raise Refused `another_script`, `another_procedure`.

@@ -25,7 +25,7 @@ class Wording:
 
     - name: a noun without an article ("robot arm").
     - short: the operator's name for it ("arm").
-    - turned: the part that sweeps turn ("the wrists").
+    - turned: the part that is turned in a sweep ("the wrists").
     - method: a clause for the certificate on how it turns the items; "{turns}" stands for the rotation of the sweeps.
     - briefly: the method in a few words, for the digital certificate.
     - directions: the source of its axes' directions.
@@ -55,8 +55,9 @@ class TurnerKind(Generic[SectionT, ReportT]):
 
     - name: the kind in a configuration (`turner: kind: name`).
     - section: the model of the section `turner:`.
-    - connect: returns a context manager of the turner, which is stopped at its end. The function passed gets every
-      state, in order; the file takes the output of a maker's client. Raise Refused if no turner answers.
+    - connect: returns a context manager of the turner, which is stopped at its end. Its arguments are the section, a
+      function that gets every state in order, and a file for the output of a maker's client. Raise Refused if no turner
+      answers.
     - look: reads the turner's report about itself; nothing moves, no program is stopped. Raise Refused as `connect`.
     - stance: describes its pose in a line of text.
     - problems: lists all reasons not to execute the last of the plans, before anything moves; without a report, only

@@ -112,7 +112,7 @@ def _file(path: Path) -> Handler:
 
 
 async def _answer(request: Request) -> tuple[int, bool] | None:
-    """Return the question's number and the answer; None if the request's body is not of this form."""
+    """Return a question's number and the operator's answer to it; None if the request's body is not of this form."""
     try:
         document = json.loads(await body_of(request))
     except ValueError:

@@ -35,7 +35,10 @@ class Source(Protocol):
 
 
 class Feed:
-    """The page's state between two threads; a listener of the run's events. Every frame has the ages of its content."""
+    """The page's state, which the run's thread changes and the server's thread reads; a listener of the run's events.
+
+    Every frame states how old its contents are.
+    """
 
     def __init__(self, shown: PageState, now: Callable[[], float] = time.monotonic) -> None:
         self._shown, self._now = shown, now

@@ -45,7 +45,8 @@ def new_token() -> str:
 class Door:
     """Access to the page: its `hosts` (name:port), the `token`, and whether spectators need it too.
 
-    `pass_to_look` opens the certificate only: it is for a cookie, and cookies are not bound to a port.
+    `pass_to_look` is sent as a cookie and opens the certificate only, because cookies are not bound to a port: another
+    server on this computer may receive them.
     """
 
     hosts: frozenset[str]

@@ -48,7 +48,10 @@ class HostCorrected:
 
 
 def correct_rates(name: str, raw: RecordedSensor, calibration: Calibration, on_samples: OnSamples) -> OnSamples:
-    """Return a receiver that passes on M (m + b) for each rate m of the sensor `name`, and other samples unchanged."""
+    """Return a receiver that corrects the rates of the sensor `name`, and passes all samples on to `on_samples`.
+
+    A rate m becomes M (m + b), with the matrix M and the bias b of `calibration`.
+    """
     per_count = raw.channel(RATE).unit_per_count
     described = describe_corrected(raw, calibration, per_count)
     matrix, bias = np.array(calibration.matrix), np.array(calibration.bias_rad_s) / per_count

@@ -212,7 +212,7 @@ class HandSession:
         return _turn_not_closed(f"that turn ended {abs(np.degrees(missed_rad)):.1f}° from where it began")
 
     def _laid_after_turn(self, now: SessionProgress) -> Fault | None:
-        """Return a fault if the item was laid down again after a whole turn, so that it lies anywhere, else None."""
+        """Return a fault if the item was laid down again after a whole turn, so that its heading changed, else None."""
         request = self._request
         if request is None or request.instruction.say != "lay" or request.again not in LAID_AGAIN:
             return None

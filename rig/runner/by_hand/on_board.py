@@ -108,7 +108,7 @@ class FollowedSession:
         self.tell(HandRested(report.after_us, report.end_us, self._lay[-1]))
 
     def _ask(self, wrong: Fault | None) -> None:
-        """Request the next flip; the order `FACE_ORDER` begins anew until the board has enough moves.
+        """Request the next flip. The faces follow `FACE_ORDER`, again and again, until the board has enough moves.
 
         `wrong`: the error for which the last move was refused, else None.
         """
@@ -188,7 +188,7 @@ def _check(name: str, sensor: RecordedSensor, board: Board) -> None:
 
 
 def _follow(source: BoardSource, session: FollowedSession) -> None:
-    """Follow the session to its end. After ten refused moves in a row, raise the Fault of the last."""
+    """Follow the session to its end. After ten refused moves in a row, raise the Fault of the last refused move."""
     while True:
         report = source.board.hand_report()
         session.take(report)

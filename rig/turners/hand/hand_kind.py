@@ -1,4 +1,4 @@
-"""An operator's hand as a kind of turner: without joints, states or motion of its own.
+"""An operator's hand as a kind of turner: it has no joints, reports no states and cannot be driven.
 
 The sensors' readings determine the motion; the clock of a recording is the board's.
 """
@@ -25,7 +25,7 @@ LOOK_S = 0.02
 
 @dataclass(frozen=True, slots=True)
 class HandState:
-    """A `State` without joints; its time is the computer's and enters no solution."""
+    """A `State` without joints. Its time is the computer's, which the solution does not use."""
 
     time_s: float
     host_time_s: float
@@ -70,7 +70,7 @@ class Hand:
 
     @property
     def latest(self) -> HandState:
-        """The present moment."""
+        """The present time, as a state."""
         now_s = time.monotonic()
         return HandState(now_s, now_s)
 
@@ -85,7 +85,7 @@ class Hand:
         """Do nothing: a hand needs no preparation."""
 
     def move(self, motion: Motion, watch: Callable[[], None] = lambda: None) -> None:
-        """Raise Fault `unplanned_motion`: a hand makes no motion of joints."""
+        """Raise Fault `unplanned_motion`, because a hand cannot be driven."""
         raise Fault(
             "unplanned_motion",
             "a script orders a motion of joints, and a hand turns the item",

@@ -85,7 +85,7 @@ class Bus:
         return int(number)
 
     def more_came(self, wait_s: float) -> bool:
-        """Return whether another byte arrives within `wait_s`, without a request."""
+        """Return whether another byte arrives within `wait_s`, although nothing was requested."""
         with self._failing():
             for _ in range(max(1, round(wait_s / READ_WAIT_S))):
                 if self._port.readPort(1):
@@ -113,7 +113,10 @@ class Bus:
         return bytes(reply[DATA : DATA + register.size])
 
     def look_up(self, register: Register) -> tuple[int, ...]:
-        """Return a register's values; repeat lost requests. Raise ReplyLost, InstructionDenied, PortGone."""
+        """Return a register's values. A request whose reply is lost is repeated.
+
+        Raise ReplyLost, InstructionDenied, PortGone.
+        """
         for _ in range(MAX_ATTEMPTS - 1):
             try:
                 return self.read(register)

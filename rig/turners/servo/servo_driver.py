@@ -118,7 +118,7 @@ class Servo:
         return self._report
 
     def problems(self, carried: FlangeLoad, motions: Iterable[Motion] = ()) -> list[Problem]:
-        """Return all problems of the payload and the motions."""
+        """Return all problems of the servo, the payload and the motions."""
         return [
             *servo_problems(self._report, self._wanted_model, carried, self._period_s),
             *move_problems(motions, self._report.velocity_limit_rad_s),

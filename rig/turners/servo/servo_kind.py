@@ -72,7 +72,7 @@ def _problems(plans: Sequence[Plan], section: ServoSection, report: ServoReport 
 
 
 def _wind_up_problems(plans: Sequence[Plan], report: ServoReport) -> list[Problem]:
-    """Return a problem if the shaft is more than a revolution from home: the cable may be wound up."""
+    """Return a problem if the shaft is more than a revolution from home, because the cable may be wound up."""
     (angle_rad,) = report.state.q_rad
     distance_rad = max((abs(angle_rad - plan.home_q_rad[0]) for plan in plans), default=0.0)
     if distance_rad <= MAX_TRAVEL_RAD:

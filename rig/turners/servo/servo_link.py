@@ -157,7 +157,11 @@ class ServoLink:
             self._fail(hardware_problem(self._error_bits))
 
     def _fresh(self, state: ServoState) -> bool:
-        """Return whether a reply is current by the servo's clock; after many contradictions, trust the newest reply."""
+        """Return whether a reply is the answer to the latest request, not a late answer to an earlier one.
+
+        The servo's clock must have advanced by the time between the requests. After many contradictions in a row the
+        servo must have restarted; then the newest reply is trusted.
+        """
         before = self._latest
         if state.took_s > MAX_TRANSACTION_S:
             return False

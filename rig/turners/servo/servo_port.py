@@ -1,9 +1,9 @@
 """The serial port under the maker's packet handler, with the methods that the handler calls.
 
 The maker's own `PortHandler` polls with a full processor core, measures time-outs by the wall clock, which may be set,
-has one time-out for every adapter, shares the port with other programs, and remains busy after an exception. In `Port`
-the system waits, the clock is monotonic, the time-out suits the line, the port is locked, and a failed port is never
-used again.
+has one time-out for every adapter, shares the port with other programs, and remains busy after an exception. `Port`
+lets the operating system wait for data, uses a monotonic clock and a time-out that suits the line, locks the port, and
+never uses a failed port again.
 """
 
 from collections.abc import Sequence

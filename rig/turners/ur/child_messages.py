@@ -51,7 +51,7 @@ class Connected:
 
 @dataclass(frozen=True, slots=True)
 class ChildHeartbeat:
-    """The child's sign of life; `states` are those since the last one, oldest first.
+    """The child's sign of life; `states` are the arm's states since the child's last heartbeat, oldest first.
 
     `silent_s`: a lower bound of the time since data came from the controller (`StateStream`).
     """

@@ -36,7 +36,7 @@ def stop_problem(host: str, version: tuple[int, ...]) -> Problem | None:
 
 
 def no_states(host: str, error: OSError) -> Problem:
-    """Return the problem of a host that sends no states, because no arm or only the arm's other ports answer."""
+    """Return the problem of a host that sends no states: either no arm answers, or only other ports of the arm do."""
     for interface in (Dashboard, PrimaryStop):
         try:
             interface(host, CLOSED_PORT_TIMEOUT_S).close()

@@ -16,7 +16,7 @@ LIMIT_TOLERANCE = 1e-6  # relative
 
 
 def motion_problems(motion: Motion, ours: JointLimits, theirs: JointLimits | None) -> list[Problem]:
-    """Return the problems of a motion beyond the model's limits or its controller's, whichever is narrower."""
+    """Return the problems of a motion beyond the narrower of the limits `ours` (model) and `theirs` (controller)."""
     return [
         *_position_problems(motion, ours, theirs),
         *_speed_problems(motion, ours.speed_rad_s, None if theirs is None else theirs.speed_rad_s),
@@ -105,5 +105,8 @@ def _fractions(motion: Motion) -> Array:
 
 
 def _narrower(ours: float, theirs: float | None) -> tuple[float, str]:
-    """Return the narrower limit and its owner: the model for `ours`, also if both nearly agree, else the controller."""
+    """Return the narrower of two limits, and whether it is the model's (`ours`) or the controller's (`theirs`).
+
+    If both nearly agree, or the controller states none, the model's is returned.
+    """
     return (ours, RIG_LIMIT) if theirs is None or theirs >= ours * (1 - LIMIT_TOLERANCE) else (theirs, CONTROLLER_LIMIT)

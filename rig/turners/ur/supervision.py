@@ -15,7 +15,7 @@ FIELDBUS = (
 
 
 def describe_early_end(problem: Problem) -> Problem:
-    """Return the problem that the control program was stopped right after its start, as `problem` shows."""
+    """Return the problem of a control program that was stopped right after its start; it quotes `problem`."""
     what = f"the control program on the arm was stopped right after its start ({problem.what})"
     return Problem("program_stopped", what, FIELDBUS)
 
@@ -29,7 +29,7 @@ class ControlStage(Enum):
 
 
 class Supervision:
-    """The judge of consecutive states. All times are the controller's."""
+    """The judgement of an arm's states, one after the other. All times are the controller's."""
 
     def __init__(self) -> None:
         self.stage = ControlStage.LOOKING
@@ -42,8 +42,9 @@ class Supervision:
     def judge(self, state: ArmState) -> Problem | None:
         """Return why the arm cannot continue; None if it can.
 
-        The safety bits that explain a stop may come one packet later than the stop. An interruption ends our program; a
-        program that runs soon after belongs to another client.
+        An interruption of our program is returned only after a short wait, because the safety bits that explain a stop
+        may come one packet later than the stop. It also counts if a program runs again soon after, which then belongs
+        to another client.
         """
         if self.stage is ControlStage.LOOKING:
             return None

@@ -34,7 +34,7 @@ class SimulatedTruth:
         self._config, self._world = config, world
 
     def scale(self, name: str, windows_s: Windows, speed_rad_s: float) -> np.ndarray:
-        """Return the scale factors (3,) of a gyroscope between rotations at plus and minus `speed_rad_s`."""
+        """Return the scale factors (3,) of a gyroscope, from rotation about each axis at ± `speed_rad_s`."""
         difference = self._rates(name, windows_s, speed_rad_s) - self._rates(name, windows_s, -speed_rad_s)
         mean: np.ndarray = np.mean(2 * speed_rad_s / difference, axis=0)
         return mean

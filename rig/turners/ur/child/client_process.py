@@ -232,8 +232,9 @@ class _Child:
     def _await_payload(self, wanted_kg: float) -> Message:
         """Wait until the states show the payload, and return the answer; the parent judges all else in the states.
 
-        Older states may still be unread, because the client's constructor blocked the interpreter or this process got
-        no processor. So the payload counts as refused only if the first state on a new connection does not show it.
+        States from before the payload was set may still be unread, because the client's constructor blocked the
+        interpreter or this process got no processor. So the payload counts as refused only if the first state on a new
+        connection does not show it.
         """
         host_s, arm_s = time.monotonic(), self._latest.state.time_s
         while abs((latest := self._latest).payload_kg - wanted_kg) > PAYLOAD_TOLERANCE_KG:

@@ -1,10 +1,9 @@
 """A stop by a script line that ends the program, sent to the primary interface over plain TCP.
 
-It works with every version of PolyScope, because the controller itself reads the line; the dashboard is served by the
-program on the teach pendant. The controller accepts lines only in remote control, and acknowledges none. In local
-control it answers each line with the error C210. The states that the controller sends ten times a second show whether a
-program runs. Sources: the maker's client library, `PrimaryClient::commandStop`;
-client interface description: robot mode data, sub-package 0 of a robot state.
+The line is read by the controller itself; the dashboard, in contrast, is served by the program on the pendant's screen.
+The controller accepts lines only in remote control, and acknowledges no line. In local control it answers each line
+with an error, C210. Its states, ten a second, show whether a program runs. Sources: the maker's client library,
+`PrimaryClient::commandStop`; client interface description: robot mode data, sub-package 0 of a robot state.
 """
 
 import socket

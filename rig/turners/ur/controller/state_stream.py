@@ -120,9 +120,9 @@ class StateStream:
     def read(self, timeout_s: float) -> list[StatePacket]:
         """Return the packets received, oldest first; wait at most `timeout_s` for the first one.
 
-        A `closed` stream has no states. A packet with an impossible state or time is omitted and becomes the stream's
-        `problem`. An impossible state also closes the stream; after a step of the clock the states continue, because
-        they still show whether the arm is at rest.
+        After the stream is `closed`, there are none. A packet with an impossible state or time is omitted and becomes
+        the stream's `problem`. An impossible state also closes the stream; after a step of the clock the states
+        continue, because they still show whether the arm is at rest.
         """
         looked_s = time.monotonic()
         if self.closed:
