@@ -51,7 +51,7 @@ def sample_batches(frames: Iterable[Frame], host_time_s: float) -> Iterator[Samp
 
 
 def _runs(frames: Iterable[Frame]) -> list[list[Frame]]:
-    """Return runs of consecutive frames of each sensor, in order."""
+    """Return the frames of each sensor, divided into runs of consecutive ones, in order."""
     runs, latest = list[list[Frame]](), dict[int, list[Frame]]()
     for frame in frames:
         sensor = frame.values["sensor"]
@@ -294,8 +294,9 @@ class BoardSolution:
 class StoredPolynomials:
     """The changes of scale and bias with the part's own temperature T in `range_c`; outside they stay constant.
 
-    Row n − 1 of each matrix (3, 3) has the coefficients of (T − `Calibration.temperature_c`)ⁿ, n from 1 to 3, one for
-    each axis. One plus the scale's change multiplies m + b, m the reading; the bias' change is added to b.
+    Row n − 1 of each matrix (3, 3) has, for each axis, the coefficient of (T − `Calibration.temperature_c`)ⁿ, n = 1, 2,
+    3. The change of the bias is added to b; the sum m + b with the reading m is then multiplied by 1 plus the change of
+    the scale.
     """
 
     range_c: tuple[float, float]

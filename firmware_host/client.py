@@ -50,10 +50,11 @@ _ABOUT_THE_BOARD = ("unknown_message", "bad_length", "busy_streaming")  # errors
 
 
 class Board:
-    """The board on a serial port or `socket://host:port`; a context manager. `on_samples` runs on the reader thread.
+    """The board on a serial port or `socket://host:port`; a context manager, which closes the port at its end.
 
-    Sensors are given by their index in `identity.sensors`. Every request may raise BoardError `board_link_lost`, and
-    the board's refusal, with its name in `protocol.ERRORS` (`sensor_absent`, `no_calibration`, …).
+    A thread reads the port and calls `on_samples`. Sensors are given by their index in `identity.sensors`. Every
+    request may raise BoardError `board_link_lost`, and the board's refusal, with its name in `protocol.ERRORS`
+    (`sensor_absent`, `no_calibration`, …).
     """
 
     def __init__(self, port: str, baud: int, on_samples: Callable[[SampleBatch], None], timeout_s: float = 4.0) -> None:
@@ -84,14 +85,15 @@ class Board:
         self.close()
 
     def configure(self, sensor: int, rate_hz: float, range_deg_s: float, range_g: float = 0.0) -> SensorSetup:
-        """Set a gyroscope to the nearest data rate and the next range up.
+        """Set a gyroscope to the data rate nearest to `rate_hz`, and to the smallest range of at least `range_deg_s`.
 
-        With `range_g` other than 0, accelerations are sent too, in the next range up, unless the stream is calibrated.
+        With `range_g` other than 0, accelerations are sent too, in the smallest range of at least `range_g`, unless the
+        stream is calibrated.
         """
         return self._configure(sensor, rate_hz, range_deg_s=range_deg_s, range_g=range_g)
 
     def configure_magnetometer(self, sensor: int, rate_hz: float, range_gauss: float) -> SensorSetup:
-        """Set a magnetometer to the nearest data rate and the next range up."""
+        """Set a magnetometer to the data rate nearest to `rate_hz` and the smallest range of at least `range_gauss`."""
         return self._configure(sensor, rate_hz, range_gauss=range_gauss)
 
     def start(self, calibrated: Collection[int] = ()) -> None:
@@ -120,7 +122,7 @@ class Board:
         return BoardObservation.decode(self._ask("observe", values))
 
     def recall(self, sensor: int, index: int, mean_rad_s: Sequence[float], speed_rad_s: float) -> BoardObservation:
-        """Add an observation made before a reset, with its `mean_rad_s`; `index` is as in `observe`."""
+        """Send the board an observation that it made before a reset: its `mean_rad_s`, with `index` as in `observe`."""
         values = {"sensor": sensor, "index": index, "mean_rad_s": mean_rad_s, "speed_rad_s": speed_rad_s}
         return BoardObservation.decode(self._ask("recall", values))
 
@@ -180,7 +182,8 @@ class Board:
     def check(self, clock_s: float | None = None) -> None:
         """Raise the link's fault, if any, or BoardError `board_link_lost` if a streaming board is silent for too long.
 
-        If `clock_s`, the present time of another instrument's clock, is given, it must show as long a silence.
+        `clock_s` is the present time on another instrument's clock. If it is given, the silence must be too long on
+        that clock as well.
         """
         if self._link.fault is not None:
             raise self._link.fault
@@ -231,7 +234,10 @@ class Board:
         return identity
 
     def _why_no_hello(self, byte_count: int, frame_count: int) -> BoardError:
-        """Return why no greeting came, judged from the received data: an idle board sends twice a second."""
+        """Return why no greeting came, judged from the bytes and frames received meanwhile.
+
+        An idle board sends an identity twice a second, so a port without bytes has no board.
+        """
         if frame_count:
             return BoardError(
                 "no_board",

@@ -7,7 +7,7 @@ MAX_LOAD_FACTOR = 5.0  # on a limit: the number of runnable programs per process
 
 
 def exceeds(delay: float, limit: float) -> bool:
-    """Return whether a delay exceeds a limit times the load, which is read only if the delay exceeds the limit."""
+    """Return whether `delay` exceeds `limit` times the load. The load is read only if `delay` exceeds `limit`."""
     return delay > limit and delay > limit * load_factor()
 
 

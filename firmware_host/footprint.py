@@ -1,9 +1,9 @@
 """The image's use of the chip: `python -m firmware_host.footprint`, which `make firmware` runs after the build.
 
-Flash and RAM are the linker's. The stack is the board's own report after a session on the emulator with all its
-functions: all gyroscopes streaming with accelerations, and a magnetometer, observations stored and averaged, both
-solutions, a move by hand solved, the heater on, a calibration over temperature written, read, applied to a stream and
-erased.
+The use of flash and RAM is read from the linker's output. The use of the stack is the board's own report after a
+session on the emulator with all its functions: all gyroscopes streaming with accelerations, and a magnetometer,
+observations stored and averaged, both solutions, a move by hand solved, the heater on, a calibration over temperature
+written, read, applied to a stream and erased.
 """
 
 import io

@@ -27,9 +27,10 @@ class _Request:
 class BoardLink:
     """An open serial port or `socket://host:port`, read by a thread of its own.
 
-    `on_frame(frame, request)` is called on that thread for every frame outside the stream, with the name of the request
-    that the frame answers, or None; the call ends before `ask` returns. `on_stream(frames, host_time_s)` is called for
-    all frames of the stream that came together. Exceptions of both become the `fault`, as does the loss of the port.
+    The thread calls `on_frame(frame, request)` for every frame outside the stream; `request` names the request that the
+    frame answers, None if it answers none. This call ends before `ask` returns. It calls `on_stream(frames,
+    host_time_s)` with all frames of the stream that came together. Exceptions of both become the `fault`, as does the
+    loss of the port.
     """
 
     def __init__(
@@ -70,7 +71,7 @@ class BoardLink:
 
     @property
     def silent_s(self) -> float:
-        """The time spent reading without receiving a frame: a delayed reader does not make the board appear silent."""
+        """The time spent reading without receiving a frame. It does not grow while the reader itself is delayed."""
         return self._reads_without_frame * READ_TIMEOUT_S
 
     @property

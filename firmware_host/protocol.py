@@ -134,7 +134,7 @@ class Message:
 
 
 def _next(rows: int, values: Iterator[Any]) -> Any:
-    """Return the next value, vector or matrix of those that `head` unpacks."""
+    """Take from `values`, which `head` has unpacked, the next value, vector or matrix, and return it."""
     if rows == 0:
         return next(values)
     rows_of_three = tuple(tuple(islice(values, 3)) for _ in range(rows))

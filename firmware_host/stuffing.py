@@ -17,7 +17,8 @@ def stuff(body: bytes) -> bytes:
 def unstuff_in_python(block: bytes) -> bytes | None:
     """Return the content of `block`, which is shorter than 255 bytes; None if it is damaged.
 
-    Each code byte is the distance to the next code byte; all but the first also stand for a zero of the content.
+    Each code byte is the distance to the next code byte. Every code byte except the first also stands for a zero of the
+    content.
     """
     if 0 in block:
         return None

@@ -13,10 +13,10 @@ _ENOUGH = 1_000  # aligned runs after which an instruction is trusted
 
 
 class AlignmentWatch:
-    """The check of a word access's base register before each access, from the first run of its block on.
+    """The check that word accesses are aligned: before each access its base register is read.
 
-    An access that was aligned often enough is trusted and no longer checked, because Unicorn goes through the whole
-    list of hooks at each hooked instruction.
+    An instruction is watched from the first run of its block on. Once it was aligned often enough it is trusted and no
+    longer watched, because Unicorn goes through the whole list of hooks at each hooked instruction.
     """
 
     def __init__(self, engine: Engine) -> None:
@@ -47,7 +47,7 @@ class AlignmentWatch:
         self._trusted.clear()
 
     def _judge(self, address: int) -> None:
-        """Raise Violation if the access is not aligned; otherwise trust it, because it was aligned often enough."""
+        """Raise Violation if the access is not aligned. Otherwise it has been aligned often enough to be trusted."""
         read_base, _ = self._watched[address]
         base = read_base()
         if base & 3:

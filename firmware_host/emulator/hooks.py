@@ -17,7 +17,7 @@ PREDICTED_PAIRS = 16
 
 
 class Time(ctypes.Structure):
-    """`now`, and the `deadline` before which time passes without Python; ticks."""
+    """The present tick, `now`, and the tick `deadline`, before which time passes without a call of Python."""
 
     _fields_ = (("now", Int), ("deadline", Int))
     now: int

@@ -34,7 +34,7 @@ class EmulatedBoard:
     - `elf`: the same program with symbols.
     - `devices`: the devices on SPI1.
     - `unique_id`: 12 bytes.
-    - `crystal_ppm`: the error of the board's crystal, or of its substitute without one (`has_crystal`).
+    - `crystal_ppm`: the error of the board's crystal or, if it has none (`has_crystal`), of its clock.
     - `boot_time_s`: the virtual time of power-up.
 
     Instructions are counted exactly and take one core cycle each; every doubleword of a block is fetched with the wait

@@ -67,5 +67,5 @@ class Timeline(Time):
         return self._may_continue()
 
     def interrupt(self) -> None:
-        """Pause the core at the end of the current block: an exception may have become pending."""
+        """Pause the core at the end of the current block, because an exception may have become pending."""
         self.deadline = 0

@@ -4,7 +4,7 @@ from firmware_host.parts import BOARD_PARTS, GYROSCOPES
 
 
 def _pin(pin: str) -> str:
-    """Return port and number of a pin: "PA11" is "A, 11"."""
+    """Return the port and the number of a pin as C arguments: "PA11" becomes "A, 11"."""
     return f"{pin[1]}, {int(pin[2:])}"
 
 

@@ -20,8 +20,9 @@ class FlashMemory:
 
     - `image`: the program, from the start.
     - `store`: the last pages, erased if omitted.
-    - `torn`: offsets of doublewords with an interrupted erasure or programming. The chip detects the reading of one;
-      with `flags_lost` it does not report its offset, as in the chip's errata on a power loss during an operation.
+    - `torn`: offsets of doublewords with an interrupted erasure or programming. The chip detects a read of such a
+      doubleword. With `flags_lost` it does not report which one, as in the chip's errata on a power loss during an
+      operation.
     - `on_change`: called after every change.
 
     Raise BoardError if the image does not fit.

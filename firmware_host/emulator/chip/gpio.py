@@ -55,7 +55,7 @@ class Port:
         )
 
     def watch(self, pin: int, on_level: Callable[[bool], None]) -> None:
-        """Call `on_level` after a change of the firmware's output on `pin`, which counts as high if not an output."""
+        """Call `on_level` whenever the firmware changes its output on `pin`. A pin that is no output counts as high."""
         self._watched[pin] = on_level
         self._watched_pins |= 1 << pin
 
@@ -70,7 +70,7 @@ class Port:
         self._levels = self._levels & ~(1 << pin) | high << pin
 
     def is_input(self, pin: int) -> bool:
-        """Return whether a pin is a digital input; a pin in analog mode, as after a reset, is none."""
+        """Return whether a pin is a digital input. After a reset it is not: pins are then in analog mode."""
         return bool(self._input_pins >> pin & 1)
 
     def _read_levels(self) -> int:

@@ -18,7 +18,8 @@ _PRIORITY_BITS = 0xF0  # the chip implements the upper four of eight
 class Nvic:
     """Exceptions by number (16 + interrupt number): enabled, pending, active, priority.
 
-    A peripheral sets its interrupt line with `set_line`; a line still high when its handler returns pends again.
+    A peripheral sets its interrupt line with `set_line`. If the line is still high when the handler returns, the
+    interrupt is pending again.
     """
 
     name = "NVIC"

@@ -51,7 +51,7 @@ class Power:
 
 
 class Rcc:
-    """Oscillators, PLL, bus prescalers, clock gates. `on_gate(peripheral, on)` is called for all after a change."""
+    """Oscillators, PLL, bus prescalers, clock gates; `on_gate(peripheral, on)` reports all gates after a change."""
 
     name = "RCC"
     base = 0x4002_1000

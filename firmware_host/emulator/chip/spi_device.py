@@ -28,7 +28,7 @@ class SpiDevice(Protocol):
     - `spi_modes`, `spi_max_hz`: limits of its bus interface; the clock limit depends on the access and is read after
       the first byte of each access.
     - `next_event_s`: the time of its next own action, infinity for never.
-    - `fault`: its fault; the wires simulate all faults except the identity.
+    - `fault`: its fault. `OTHER_PART` is simulated by the part itself, all other faults by the wires.
     """
 
     fault: Fault | None

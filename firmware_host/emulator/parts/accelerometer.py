@@ -45,8 +45,8 @@ class AccelerometerTruth:
 class Accelerometer:
     """Three sensing axes with the errors of `truth`, or without errors and noise if `truth` is None.
 
-    `motion_at`, `seed`, `temperature_c`: as for the part's `Gyroscope`, whose noise is independent. If the motion has
-    only the 3 components of the rate, the part rests with z up.
+    `motion_at`, `seed`, `temperature_c`: as for the part's `Gyroscope`; the noise of the two is independent. If the
+    motion has only the 3 components of the rate, the part rests with z up.
     """
 
     def __init__(

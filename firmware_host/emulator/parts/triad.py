@@ -82,7 +82,7 @@ class Triad:
         self._noise: list[float] = []
 
     def sense(self, true: Sequence[Any], warmer_k: Any, nonlinearity: Nonlinearity | None = None) -> list[Any]:
-        """Return the sensed vector before bias and noise: three floats or arrays, as `true` and `warmer_k`.
+        """Return the sensed vector before bias and noise: three floats, or arrays if `true` and `warmer_k` are arrays.
 
         `nonlinearity` maps the component along an element's axis.
         """
