@@ -58,7 +58,7 @@ class _Done:
 
 
 def moments(run: RunData) -> Iterator[Moment]:
-    """Yield the events of a recording with their times, in order; nothing without a state of the turner."""
+    """Yield the events of a recording with their times, in order; nothing if it has no state of the turner."""
     if len(run.states) == 0:
         return
     times_s = run.states["time_s"]

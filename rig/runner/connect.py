@@ -135,7 +135,7 @@ class Connector:
         return source
 
     def _connect_others(self, stack: ExitStack, acquisition: Acquisition) -> Iterator[SampleSource]:
-        """Yield sources of the sensors with their own ports; for a verification, correct their readings here."""
+        """Yield sources of the sensors with their own ports; for a verification, the host corrects their readings."""
         config, calibrated = self.loaded.config, self.phase.procedure.reads_corrected
         for port, kind, sections in group_by_port(config.sensors):
             on_samples: OnSamples = acquisition.on_samples

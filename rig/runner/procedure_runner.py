@@ -152,8 +152,8 @@ class Rig:
     def preflight(self) -> None:
         """Check every condition of a movement, ask the operator, and take control of the arm.
 
-        A movement with agreement in advance begins without a question, unless the arm has moved since. Raise Refused
-        with all problems before anything moves.
+        A movement to which the operator agreed in advance begins without a question, unless the arm has moved since.
+        Raise Refused with all problems before anything moves.
         """
         report, kind, section = self.devices.report, self.devices.kind, self.devices.section
         refuse(kind.problems([self.whole_plan, self.plan], section, report))
@@ -418,7 +418,8 @@ class Rig:
     def solve_on_board(self) -> None:
         """Let the board compute its own calibration from its averages, for comparison with the host's.
 
-        The board does so only after the last stage, from the sweeps of all stages, by their speeds alone.
+        The board does so only after the last stage, from the sweeps of all stages. It is told each sweep's speed, but
+        not the axis of its rotation.
         """
         if self.onboard is not None and self.last:
             self.onboard.solve()

@@ -39,9 +39,9 @@ class _RecentReadings:
     at_rest_counts: list[float] = field(default_factory=list)
 
     def find_scatters_counts(self, most: int) -> list[float]:
-        """Return the standard deviation of each of the newest spans of readings, RMS over the axes, the newest first.
+        """Return the scatter of each of the newest spans of readings, the newest span first, at most `most` of them.
 
-        There are at most `most`, and fewer if there are not enough readings.
+        The scatter is the standard deviation, RMS over the axes. There are fewer if there are not enough readings.
         """
         count = min(most, len(self.recent) // self.enough)
         if not count:

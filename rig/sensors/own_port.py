@@ -45,8 +45,8 @@ class PortFaults:
 class OwnPort:
     """An open port and the thread that reads it until `close`; `take` gets the data and the time of each read.
 
-    `news` is locked during `take`, and notified after it. The first error that ends the reading becomes the `fault`:
-    the port's OSError, a SensorError, or an error of a consumer.
+    The condition `news` is locked during `take`, and notified after it. The first error that ends the reading becomes
+    the `fault`: the port's OSError, a SensorError, or an error of a consumer.
     """
 
     def __init__(

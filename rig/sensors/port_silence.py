@@ -12,7 +12,7 @@ MAX_ATTEMPTS = 4  # of a request
 
 @dataclass(frozen=True, slots=True)
 class Patience:
-    """A driver's time-outs: `first_s` for the first data or an answer, `silent_s` for more of a stream."""
+    """A driver's time-outs: `first_s` for the first data or an answer, `silent_s` for further data of a stream."""
 
     first_s: float = 4.0  # an Arduino restarts when its port is opened
     silent_s: float = 2.0

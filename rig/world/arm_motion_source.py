@@ -78,7 +78,7 @@ class ArmMotionSource:
 
     @property
     def waiting(self) -> bool:
-        """Whether only a client can make the arm move."""
+        """Whether the arm stays at rest until a client acts."""
         return self.robot.waiting
 
     @property

@@ -138,7 +138,7 @@ class Laboratory:
             self._elements[name].set_fault(inside)
 
     def mount(self, stage: int) -> None:
-        """Mount the item for the stage, counted from 0, as the simulated operator does, if this is configured."""
+        """Mount the item as configured for the stage, counted from 0; without a configured mounting, do nothing."""
         if stage < len(self._world.mounts):
             self._mount = mount_matrix(self._world.mounts[stage])
             for sensor in self._sensors_on_item:

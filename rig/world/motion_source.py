@@ -24,7 +24,7 @@ class MotionSource(Protocol):
 
     @property
     def waiting(self) -> bool:
-        """Whether only a client can make the turner move."""
+        """Whether the turner stays at rest until a client acts."""
         ...
 
     @property

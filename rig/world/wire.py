@@ -80,9 +80,9 @@ class SocketTable:
 class Wire:
     """The pace of one client, which may lag `lag_s` of virtual time before the world waits for it.
 
-    A wait ends when a real laboratory would have continued, because otherwise other clients would regard the world as
-    dead. The world waits for a client that reads as fast as it can, even if it is slow. For a client that does not
-    read, the world waits only until its patience with this client ends, and not again before the client has kept pace.
+    The world waits for a client that reads as fast as it can, even if it is slow. For a client that does not read, the
+    world waits only until its patience with this client ends, and not again before the client has kept pace. All other
+    clients wait meanwhile, so a longer wait would let them regard the world as dead.
     """
 
     def __init__(self, count_unread: Unread, lag_s: float, wall: Callable[[], float]) -> None:

@@ -36,7 +36,7 @@ Revolution = tuple[int, int, float]  # two board times, µs, and the speed betwe
 
 @dataclass(slots=True)
 class BoardCalibration:
-    """The board's own calibration of `sensors`: by name, the index of each on the board and its description.
+    """The board's own calibration of its `sensors`, given by name as index on the board and description.
 
     `note` records and reports the board's answers.
     """
@@ -101,7 +101,7 @@ class BoardCalibration:
                 self.note(BoardSolved(name, self.board.solve(index, method)))
 
     def _observe(self, name: str, revolution: Revolution) -> tuple[BoardObservation, float]:
-        """Return the board's observation and the speed sent to it, rad/s."""
+        """Let the board average a revolution; return its observation and the speed that it was sent, rad/s."""
         start_us, end_us, speed_rad_s = revolution
         index, _ = self.sensors[name]
         return self.board.observe(index, self._count(name), start_us, end_us, speed_rad_s), speed_rad_s

@@ -156,7 +156,7 @@ def calibrate_by_board(
 
 
 def read_kept_solution(board: Board) -> CalibratedByBoard:
-    """Return the board's solution of the last session by hand, begun by button or host, without its readings.
+    """Return the board's solution of its last session by hand, begun by button or host, with `agreement` None.
 
     Raise Refused `no_answer_by_hand`, BoardError as `Board.hand_report` does.
     """

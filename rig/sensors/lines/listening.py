@@ -18,7 +18,7 @@ MAX_BYTES = MAX_LINE_BYTES + 100  # of a line that is too long anyway
 def listen(
     port: str, baud: int | None, tell: Callable[[str], None], seconds: tuple[float, float] = (REST_S, TURNING_S)
 ) -> tuple[int, list[TimedLine], float]:
-    """Return the baud rate, the lines, and the time at which the rest ended, s, on the clock of their arrival.
+    """Return the baud rate, the lines, and the end of the device's rest, s, on the clock of the lines' arrival.
 
     `seconds`: the durations of the rest and of the turning after it; `tell` gets the operator's instructions. Raise
     SensorError `no_port`, `lines_silent`, `lines_wrong_baud_rate`, `lines_link_lost`.

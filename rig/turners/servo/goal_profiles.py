@@ -23,7 +23,7 @@ class ProfileMove(NamedTuple):
 
 
 def move_of(motion: Motion) -> ProfileMove:
-    """Return the servo's profile nearest to a motion: the same total duration, and ramps to the nearest unit."""
+    """Return the servo's profile nearest to a motion: goal and durations are rounded to the servo's units."""
     total_ms = max(MIN_PROFILE_MS, round(1000 * motion.duration_s))
     ramp_ms = min(round(1000 * motion.speed_rad_s / motion.acceleration_rad_s2), total_ms // 2)
     return ProfileMove(round(motion.target_q_rad[0] / PULSE_RAD), total_ms, ramp_ms)

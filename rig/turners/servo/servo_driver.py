@@ -145,7 +145,7 @@ class Servo:
     # Moving -----------------------------------------------------------------------------------------------------
 
     def take_control(self, carried: FlangeLoad) -> None:
-        """Hold the shaft in place and arm the watchdog. Raise Refused for `problems`, or `servo_moves`."""
+        """Hold the shaft in place and arm the watchdog. Raise Refused for one of the `problems`, or `servo_moves`."""
         self.check()
         refuse(self.problems(carried))
         ends_s = self._clock.now_s() + MAX_REST_PROOF_S

@@ -96,7 +96,7 @@ class Braked:
 
 @dataclass(frozen=True, slots=True)
 class Disturbed:
-    """A problem shown by the states, sent without a request, after which the run cannot continue."""
+    """A problem that the states show, and after which the run cannot continue. The child sends it unasked."""
 
     problem: Problem
 

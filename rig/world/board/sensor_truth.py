@@ -75,7 +75,7 @@ class SensorTruth:
         return a * u + b * v + c * w, d * u + e * v + f * w, g * u + h * v + i * w
 
     def sense(self, flange: BodyMotion) -> Sequence[float]:
-        """Return rate, rad/s, and, if the sensor senses it, force, g, at the sensor for the motion of the flange."""
+        """Return the rate, rad/s, at the sensor for a motion of the flange and, if it senses force, the force, g."""
         rate = self.rotate_rate(flange.rate_rad_s)
         if not self.senses_force:
             return rate

@@ -86,7 +86,7 @@ class SimulatedTruth:
         return SensorTruth(self._config.sensors[name], self._world.sensors[name])
 
     def _seed(self, name: str) -> np.random.SeedSequence:
-        """Return the seed of a sensor's drift, with which the laboratory simulates the sensor too."""
+        """Return the seed of a sensor's drift. The laboratory's simulation of the sensor has the same seed."""
         return np.random.SeedSequence([self._world.seed, sorted(self._world.sensors).index(name)])
 
 
@@ -121,6 +121,6 @@ def _span(windows_s: Windows) -> Windows:
 
 
 def _instants(windows_s: Windows) -> np.ndarray:
-    """Return the instants (n,), in order, at which a mean over the windows is computed."""
+    """Return the instants (n,), in order of time, whose values are averaged to a mean over the windows."""
     step_s = max(STEP_S, sum(end_s - start_s for start_s, end_s in windows_s) / MAX_INSTANTS)
     return np.concatenate([np.arange(start_s, end_s, step_s) for start_s, end_s in sorted(windows_s)])

@@ -113,7 +113,10 @@ def _pulse(time_s: Array, begins_s: float, lasting_s: float) -> Array:
 def _oscillate(
     time_s: Array, window_s: tuple[float, float], band_hz: tuple[float, float], rng: np.random.Generator, axes: int
 ) -> Array:
-    """Return rates (n, axes) of a random oscillation of unit angle that fades in and out within a window."""
+    """Return rates (n, axes) of a random oscillation that fades in and out within a window.
+
+    The amplitude of the angle about each axis is drawn with standard deviation 1; the caller scales it.
+    """
     part = np.clip((time_s - window_s[0]) / (window_s[1] - window_s[0]), 0, 1)
     envelope = 0.5 - 0.5 * np.cos(np.pi * np.clip(4 * np.minimum(part, 1 - part), 0, 1))  # smooth: rates do not jump
     turns = np.outer(time_s, rng.uniform(*band_hz, axes)) + rng.uniform(0, 1, axes)

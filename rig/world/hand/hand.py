@@ -34,7 +34,7 @@ class HandMotion:
 class SimulatedHand:
     """A body that rests on a table at time 0, with the axis `face` upwards, and is then handled.
 
-    Only `seed` determines the random draws, action by action.
+    All random draws follow from `seed`, so the same actions at the same times give the same motions.
     """
 
     def __init__(self, habits: Habits, seed: int) -> None:

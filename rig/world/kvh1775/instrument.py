@@ -41,7 +41,11 @@ def no_field(time_s: float) -> Sequence[float]:
 
 @dataclass(slots=True)
 class KvhFaults:
-    """Faults that a test can set: messages to `lose`, valid `status` bits, first byte of the built-in `test`."""
+    """Faults that a test can set.
+
+    `lose`: the number of messages still to be lost; `status`: the bits that mark axes of a message as valid; `test`:
+    the first byte of a result of the built-in test.
+    """
 
     lose: int = 0
     status: int = ALL_VALID

@@ -111,7 +111,7 @@ class Drive:
         self._memory["Goal Position"] = self._pulses(time_s, noisy=False)
 
     def torque_off(self, time_s: float) -> None:
-        """Release the shaft, which the gear then holds, or which falls by at most half a revolution."""
+        """Switch the motor off. The gear then holds the shaft, or the shaft falls by at most half a revolution."""
         self.torque = False
         self._memory["Torque Enable"] = 0
         fall = radians(self._truth.fall_deg_s)

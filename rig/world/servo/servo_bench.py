@@ -76,7 +76,7 @@ class ServoBench:
 
     @property
     def waiting(self) -> bool:
-        """Whether only a client can move the servo: always False, because its watchdog can also move it."""
+        """Whether the servo stays at rest until a client acts: always False, because its watchdog can also move it."""
         return False
 
     @property

@@ -49,7 +49,7 @@ READ_ONLY = ErrorReport(210, 0, ReportLevel.WARNING)  # sent by the socket in lo
 class Message:
     """A message to all clients. `position`: line and column of the program, for an exception.
 
-    The text of a change of the safety mode is the mode's name.
+    For a change of the safety mode, `text` is the name of the new mode.
     """
 
     number: int
@@ -89,7 +89,7 @@ class Messages:
         self._add(Message(self.last + 1, MessageKind.ERROR_CODE, "", error=error))
 
     def complain(self, error: ProgramError) -> None:
-        """Add the exception of a program."""
+        """Add a message about the exception of a program."""
         self.say(str(error), MessageKind.EXCEPTION, position=error.position)
 
     def _add(self, message: Message) -> None:

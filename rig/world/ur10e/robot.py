@@ -46,7 +46,7 @@ class Program(Protocol):
 
     @property
     def waiting(self) -> bool:
-        """Whether further ticks change nothing until a client writes an input; False if unknown."""
+        """Whether further ticks of the program change nothing until a client writes an input; False if unknown."""
         ...
 
 
@@ -173,7 +173,7 @@ class Robot:
 
     @property
     def waiting(self) -> bool:
-        """Whether the joints are at rest, and only a client can make them move in the next ticks."""
+        """Whether the joints are at rest and, in the next ticks, stay at rest until a client acts."""
         is_changing = self._start is not None or self._mode_changes or self._unlocked_tick is not None
         if is_changing or self.watchdog_s or not self.motion.still:
             return False

@@ -259,7 +259,7 @@ class _Child:
             return states.first.payload_kg
 
     def _link_problem(self, *, silent: bool = False) -> Problem | None:
-        """Return the problem of the stream of states, or of a closed or `silent` link; None if the link works."""
+        """Return the problem of the stream of states, or `link_lost` if it is closed or found `silent`, else None."""
         if self._states.problem is not None or not (self._states.closed or silent):
             return self._states.problem
         return link_lost(f"no new state arrives from the arm at {self._host}")

@@ -41,7 +41,7 @@ class DashboardSession:
     dialogue = True
 
     def __init__(self, robot: Robot) -> None:
-        """Fill the tables of commands: questions and orders, with and without a text behind them."""
+        """Fill the tables of commands: questions and orders, without and with an argument."""
         self._robot = robot
         self._opened_in_local_control = robot.local_control
         self.closing = False

@@ -177,7 +177,7 @@ class RobotApiSession:
             return _http(HTTPStatus.BAD_REQUEST, {"message": str(error)[:200]})
 
     def _obey(self, path: str, body: bytes) -> bytes:
-        """Begin to carry out an order, and return the answer; it is empty if the answer follows when that is done."""
+        """Begin to carry out an order; return the answer, or b"" if it is given only when the order is carried out."""
         if self._robot.local_control:
             return _http(HTTPStatus.FORBIDDEN, {"message": "the robot is in local control mode"})
         key, since = PROGRAM_PATHS.get(path, ("action", MIN_VERSION))

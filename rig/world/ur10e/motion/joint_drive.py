@@ -41,7 +41,7 @@ class Deflection(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class JointDrive:
-    """The drives of all six joints. The fields but `orders` are the keys of `world.arm.drive`, in rad and s.
+    """The drives of all six joints. All fields except `orders` are keys of `world.arm.drive`, in rad and s.
 
     `orders`: for each joint the components (n, Rₙ/n, φₙ) of its ripple, as in the module's equation.
     """

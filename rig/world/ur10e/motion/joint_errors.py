@@ -74,10 +74,10 @@ class JointErrors:
         self._rest: tuple[Joints, Joints] = ((), ())  # encoder and true angles at the last rest
 
     def step(self, time_s: float, smooth_qd_rad_s: Joints, q_rad: Callable[[], Joints]) -> None:
-        """Update the errors with the joints' speeds without ripple at the end of a tick, and their angles.
+        """Update the errors at the end of a tick, from the joints' speeds without ripple and their angles.
 
-        `q_rad` is called only at reversals. These are found in the speeds without ripple, because a joint's full speed
-        also changes its sign when the joint settles or is shaken.
+        `q_rad` returns the angles; it is called only at reversals. Reversals are found in the speeds without ripple,
+        because a joint's full speed also changes its sign when the joint settles or is shaken.
         """
         if smooth_qd_rad_s is self._speed:
             return
@@ -96,7 +96,7 @@ class JointErrors:
             self._moving[joint] = moving
 
     def is_quiet(self, time_s: float) -> bool:
-        """Return whether joints at rest do not vibrate or settle."""
+        """Return whether no joint at rest vibrates, or still settles after a stop, at `time_s`."""
         return not self._errors.vibration_rms_rad_s and not (
             self._errors.settling_rad and any(time_s - stop_s < self._patience_s for stop_s, _ in self._stops)
         )

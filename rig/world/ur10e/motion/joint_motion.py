@@ -47,7 +47,7 @@ class JointMotion:
     """Angles and speeds of the six joints. `step` plays a tick; `joints_at` returns them at any time within that tick.
 
     - `drive`: how the joints follow the trajectory.
-    - `encoders`: the errors of what clients receive about the joints.
+    - `encoders`: the errors of the angles and speeds that clients receive.
     - `memory_s`: the time before the last tick's end that `joints_at` covers too.
     - `vibration`: a vibration that the encoders show; it is added to their angles and to the true ones.
 

@@ -108,8 +108,8 @@ def plan_soft_joint_move(
     """Return a moveJ that a controller plays as a program of its own: the move starts gently, and stops as usual.
 
     In logs of a UR3 and of the maker's simulator the acceleration grows with the square of time in 19 steps of 8 ms, to
-    1.38 times the requested acceleration; then it has the requested value. A move that is too slow or too short for
-    this is planned without it.
+    1.38 times the requested acceleration; then it has the requested value. A move that is too slow or too short for a
+    gentle start starts as usual, too.
     """
     path = tuple(b - a for a, b in zip(start_rad, end_rad, strict=True))
     longest = max(abs(w) for w in path)

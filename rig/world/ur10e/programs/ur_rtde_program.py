@@ -77,7 +77,7 @@ class ControlProgram:
 
     @property
     def waiting(self) -> bool:
-        """Whether every command is finished and answered, and no thread runs."""
+        """Whether every command of the client is finished and answered, and no thread runs."""
         return not self._threads.any and self._idle_code is not None and self._registers.integer(0) == self._idle_code
 
     def _loop(self) -> Steps:

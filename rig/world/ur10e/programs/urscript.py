@@ -85,7 +85,7 @@ Block = tuple[Call | Loop, ...]
 def check_brackets(lines: Sequence[str]) -> None:
     """Raise `ProgramError` at the line at which the controller's compiler detects unbalanced brackets.
 
-    The compiler detects an open bracket one line later. The message contains the line as written.
+    The compiler detects an open bracket at the next line that is not empty. The message contains that line.
     """
     depth = 0
     for number, line in enumerate(lines, 1):
