@@ -13,7 +13,7 @@ _ENOUGH = 1_000  # aligned runs after which an instruction is trusted
 
 
 class AlignmentWatch:
-    """The check that word accesses are aligned: before each access its base register is read.
+    """The check that word accesses are aligned: before each access its base register is checked.
 
     An instruction is watched from the first run of its block on. Once it was aligned often enough it is trusted and no
     longer watched, because Unicorn goes through the whole list of hooks at each hooked instruction.

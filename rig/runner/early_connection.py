@@ -19,8 +19,8 @@ Connecting = Callable[[OnState, Path], AbstractContextManager[Turner]]
 class EarlyConnection:
     """The connection of the next run's turner, made before this run begins.
 
-    `connect` makes the connection, with `log` as the file for a client's output. If it fails or is lost, the run
-    connects by itself and reports the error.
+    `connect` makes it, with `log` as the file for the output of a maker's client. If the connection fails or is lost,
+    the run connects by itself and reports the error.
     """
 
     def __init__(self, connect: Connecting, log: Path) -> None:

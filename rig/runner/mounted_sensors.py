@@ -47,8 +47,8 @@ class Memory:
 class MountedSensor:
     """A sensor of this run: its name, its part, and its board, None if the sensor has a port of its own.
 
-    `last`: the last calibration of its serial number. `other_board`: the last such calibration on any board, None if
-    that is the present board, or if there is no board now or then.
+    `last`: the last calibration of its serial number. `other_board`: the last of them on any board, None if there is
+    none, if it was on the present board, or if the sensor is on no board now.
     """
 
     name: str

@@ -344,7 +344,7 @@ class Rig:
         self._done.add(dwell.index)
 
     def _wait(self, until: Callable[[], bool], at_most_s: float, watch: Callable[[], None]) -> bool:
-        """Stand still, calling `watch`, until `until` returns True; return False after `at_most_s` of arm time."""
+        """Stand still, calling `watch`, until `until()` is true; return False after `at_most_s` of controller time."""
         turner = self.devices.turner
         began_s = turner.latest.time_s
         while not until():
@@ -418,8 +418,8 @@ class Rig:
     def solve_on_board(self) -> None:
         """Let the board compute its own calibration from its averages, for comparison with the host's.
 
-        The board does so only after the last stage, from the sweeps of all stages. It is told each sweep's speed, but
-        not the axis of its rotation.
+        The board does so only after the last stage, from the sweeps of all stages. It knows the speed of each sweep,
+        but not the axis about which it turned.
         """
         if self.onboard is not None and self.last:
             self.onboard.solve()

@@ -55,9 +55,9 @@ class TurnerKind(Generic[SectionT, ReportT]):
 
     - name: the kind in a configuration (`turner: kind: name`).
     - section: the model of the section `turner:`.
-    - connect: returns a context manager of the turner, which is stopped at its end. Its arguments are the section, a
-      function that gets every state in order, and a file for the output of a maker's client. Raise Refused if no turner
-      answers.
+    - connect: returns a context manager of the turner, which is stopped at its end. `connect` is called with the
+      section, a function that gets every state in order, and a file for the output of a maker's client. Raise Refused
+      if no turner answers.
     - look: reads the turner's report about itself; nothing moves, no program is stopped. Raise Refused as `connect`.
     - stance: describes its pose in a line of text.
     - problems: lists all reasons not to execute the last of the plans, before anything moves; without a report, only

@@ -255,7 +255,7 @@ class ControlSession:
             self._world.laboratory.board.reset()
 
     def _power_dip(self) -> None:
-        """Interrupt the board's power for a moment. Its port stays open, like one of an adapter with its own supply."""
+        """Interrupt the board's power for a moment. Its port stays open, as if its adapter had a supply of its own."""
         self._world.laboratory.unplug()
         self._world.laboratory.plug_in()
 

@@ -149,7 +149,7 @@ class World:
 
     # -- faults of the wires ---------------------------------------------------------------------------------------
     def silence_arm(self, duration_s: float) -> None:
-        """Let the controller neither send nor read for `duration_s` of wall time, which clients' timeouts count."""
+        """Let the controller neither send nor read for `duration_s` of wall time, in which clients' time-outs run."""
         self._silent_until_s = time.monotonic() + duration_s
         for listener in self.arm_listeners:
             listener.set_silent(True)

@@ -36,7 +36,7 @@ Revolution = tuple[int, int, float]  # two board times, µs, and the speed betwe
 
 @dataclass(slots=True)
 class BoardCalibration:
-    """The board's own calibration of its `sensors`, given by name as index on the board and description.
+    """The board's own calibration of `sensors`, which maps each name to an index on the board and a description.
 
     `note` records and reports the board's answers.
     """
@@ -101,7 +101,7 @@ class BoardCalibration:
                 self.note(BoardSolved(name, self.board.solve(index, method)))
 
     def _observe(self, name: str, revolution: Revolution) -> tuple[BoardObservation, float]:
-        """Let the board average a revolution; return its observation and the speed that it was sent, rad/s."""
+        """Let the board average a revolution; return its observation and the speed sent to the board, rad/s."""
         start_us, end_us, speed_rad_s = revolution
         index, _ = self.sensors[name]
         return self.board.observe(index, self._count(name), start_us, end_us, speed_rad_s), speed_rad_s

@@ -60,9 +60,9 @@ class Kvh1775Settings:
 
 
 def corrections(stored: Mapping[str, str], required: Kvh1775Settings) -> dict[str, str]:
-    """Return the settings that differ from the `required` values, with these values, in the order of `NAMES`.
+    """Return the `required` values of those settings whose `stored` value differs, by name, in the order of `NAMES`.
 
-    `stored` are the instrument's present settings, which must include all `NAMES`.
+    `stored` must have all `NAMES`.
     """
     target = required.settings
     return {name: target[name] for name in NAMES if name in target and not same(stored[name], target[name])}

@@ -20,7 +20,7 @@ LEAST_GRAVITY = 0.7  # fraction of 1 g that remains in an accelerometer's median
 def find_virtual(layout: TableLayout, values: Array, title: str) -> tuple[set[int], list[str]]:
     """Return the columns that a program computed (gravity, or acceleration without gravity), and why each is omitted.
 
-    `title` is the file's name. It shows what columns contain that are named only x, y or z.
+    `title` is the file's name. It decides about columns that are named only x, y or z.
     """
     kinds: dict[str, list[int]] = {}
     for index in layout.numbers:
@@ -73,7 +73,7 @@ def explain_unread(
 def _explain_triad(layout: TableLayout, values: Array, triad: Sequence[int], sensor_read: str) -> str:
     """Return why three columns are not read.
 
-    `sensor_read` names the sensor whose readings have the same quantity and are read; "" if there is none.
+    `sensor_read` names a sensor of the same quantity that is read; "" if there is none.
     """
     headings = layout.headings
     if texts := [headings[index] for index in triad if index not in layout.numbers]:

@@ -53,7 +53,7 @@ class Stamper:
     def stamp(
         self, values: Array, skipped: int, host_time_s: float
     ) -> tuple[NDArray[np.bool_], NDArray[np.int64], NDArray[np.int64]]:
-        """Return a mask (n,) of the rows of `values` (n, columns) that are valid, and their numbers and times (m,), µs.
+        """Return a mask (n,) of the m valid rows of `values` (n, columns), and numbers and times (µs) of these rows.
 
         Numbers begin with 0 and count lost samples too. The rows arrived at `host_time_s`, after `skipped` rejected
         lines. Raise SensorError `lines_time_jumped`.
@@ -187,7 +187,7 @@ class Stamper:
 
     # -- times ---------------------------------------------------------------------------------------------------
     def _add_late(self, steps: NDArray[np.int64], host_time_s: float) -> NDArray[np.int64]:
-        """Return the `steps`, the first increased by the number of samples that were lost, if the lines are late."""
+        """Return the `steps`. If the lines are late, the first step is increased by the number of lost samples."""
         if "sequence" in self.section.columns or self._smoothed is None:
             return steps
         late_s = host_time_s - (self._host_began_s or 0.0) - self._smoothed.predict_s(int(steps.sum()))

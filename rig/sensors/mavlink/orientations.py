@@ -19,9 +19,9 @@ RIGHT_ANGLES = {
 
 @cache
 def board_rotation(number: float) -> Array | None:
-    """Return the rotation (3, 3) from the board's axes to the vehicle's for an orientation by its number.
+    """Return the rotation (3, 3) from the board's axes to the vehicle's, for the orientation with this number.
 
-    Return None unless the number stands for an orientation of right angles.
+    Return None if the orientation does not consist of right angles.
     """
     angles = RIGHT_ANGLES.get(int(number)) if number == int(number) else None
     if angles is None:

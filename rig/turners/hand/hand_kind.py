@@ -1,4 +1,4 @@
-"""An operator's hand as a kind of turner: it has no joints, reports no states and cannot be driven.
+"""An operator's hand as a kind of turner: it has no joints, measures no motion and cannot be driven.
 
 The sensors' readings determine the motion; the clock of a recording is the board's.
 """

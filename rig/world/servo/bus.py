@@ -36,7 +36,7 @@ class SimulatedBus:
         return next((baud for servo in self.servos if (baud := servo.baud_rate) is not None), None)
 
     def receive(self, data: bytes) -> None:
-        """Receive bytes from the host. The last of them ends now."""
+        """Receive bytes from the host; the transmission of the last one ends now."""
         now_s = self._now()
         if self.line.echo:
             self._send(now_s, data)

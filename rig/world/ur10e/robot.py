@@ -173,7 +173,7 @@ class Robot:
 
     @property
     def waiting(self) -> bool:
-        """Whether the joints are at rest and, in the next ticks, stay at rest until a client acts."""
+        """Whether the joints are at rest and stay so in the next ticks unless a client acts."""
         is_changing = self._start is not None or self._mode_changes or self._unlocked_tick is not None
         if is_changing or self.watchdog_s or not self.motion.still:
             return False

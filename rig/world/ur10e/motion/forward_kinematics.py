@@ -72,7 +72,7 @@ def rotate_pose(pose: Sequence[float], turn: Rotation) -> tuple[float, ...]:
 
 
 def compose_poses(frame: Sequence[float], pose: Sequence[float]) -> tuple[float, ...]:
-    """Return the pose in the base frame of a `pose` that is given in `frame`, as `pose_trans` of URScript does."""
+    """Return `pose` converted from `frame` to the base frame, in which `frame` is given, as UR's `pose_trans` does."""
     rotation = rotation_from_vector(frame[3:])
     position = (
         origin + sum(turn * coordinate for turn, coordinate in zip(row, pose[:3], strict=True))

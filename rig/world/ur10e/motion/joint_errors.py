@@ -96,7 +96,7 @@ class JointErrors:
             self._moving[joint] = moving
 
     def is_quiet(self, time_s: float) -> bool:
-        """Return whether no joint at rest vibrates, or still settles after a stop, at `time_s`."""
+        """Return whether, at `time_s`, no joint vibrates and none still settles after a stop."""
         return not self._errors.vibration_rms_rad_s and not (
             self._errors.settling_rad and any(time_s - stop_s < self._patience_s for stop_s, _ in self._stops)
         )

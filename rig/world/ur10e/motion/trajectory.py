@@ -109,7 +109,7 @@ def plan_soft_joint_move(
 
     In logs of a UR3 and of the maker's simulator the acceleration grows with the square of time in 19 steps of 8 ms, to
     1.38 times the requested acceleration; then it has the requested value. A move that is too slow or too short for a
-    gentle start starts as usual, too.
+    gentle start has the usual start.
     """
     path = tuple(b - a for a, b in zip(start_rad, end_rad, strict=True))
     longest = max(abs(w) for w in path)
