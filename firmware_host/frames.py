@@ -75,7 +75,7 @@ def encode(name: str, sequence: int, values: dict[str, Any] | None = None, items
 
 
 class _Layout(NamedTuple):
-    """A message's data for decoding, computed once."""
+    """The data needed to decode the frames of one message, computed once."""
 
     name: str
     head: Callable[[bytes, int], tuple[Any, ...]]

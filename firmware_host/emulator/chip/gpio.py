@@ -60,7 +60,7 @@ class Port:
         self._watched_pins |= 1 << pin
 
     def function(self, pin: int) -> int | None:
-        """Return the alternate function selected on `pin`, None if it has no alternate function."""
+        """Return the alternate function selected on `pin`; None if the pin is in another mode."""
         if self._mode.value >> 2 * pin & 3 != _ALTERNATE:
             return None
         return self._alternate[pin // 8].value >> 4 * (pin % 8) & 0xF

@@ -131,6 +131,7 @@ def _sample_line(
             yield
         speed_m_s = top_m_s * min(1.0, knot * step_s / ramp_s, max(0.0, duration_s - knot * step_s) / ramp_s)
         try:
+            # The joint speeds that move the flange along the line at the knot, at angles predicted for it.
             next_qd: Array = np.asarray(
                 np.linalg.solve(_jacobian(q + qd * step_s, links), twist * (speed_m_s / length)), dtype=np.float64
             )

@@ -81,6 +81,7 @@ def plan_joint_move(
     if longest == 0.0:
         return build_rest(end_rad)
     ratios = tuple(w / longest for w in path)
+    # Speeds and distances below are those of the joint with the longest path; the others have these ratios to it.
     top = min([speed_rad_s, *(limit / abs(s) for s, limit in zip(ratios, limits_rad_s, strict=True) if s != 0.0)])
     speed = min(top, sqrt(longest * acceleration_rad_s2))
     ramp_s = speed / acceleration_rad_s2
