@@ -6,7 +6,7 @@ ARM, READINGS = "arm", "readings"
 
 
 class Arrivals:
-    """The arrival of the newest state of the arm and of the newest readings, for any turner and sensor.
+    """The arrival times of the newest state and of the newest readings, of any turner and any sensor.
 
     An event that repeats a state, or a number of samples, is ignored.
     """

@@ -95,7 +95,7 @@ def after_fault(command: str, *, repeats: bool) -> Row:
 
 
 def _truth(true: TruthRow | None) -> Row | None:
-    """Return the printed true values, and (result − truth)/U; None without a truth."""
+    """Return the printed true values, and (result − truth)/U; None if the truth is not known."""
     if true is None:
         return None
     return {

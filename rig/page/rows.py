@@ -89,7 +89,7 @@ def look_of(partial: PartialResults) -> Look:
 
 
 def parameter_rows(result: ResultDocument) -> list[Row]:
-    """Return the rows of a run's result, kind by kind, with U; without a budget, with twice the noise."""
+    """Return the rows of a run's result, kind by kind, with U or, if there is no budget, with twice the noise."""
     return [_row(row) for row in shown(result)]
 
 

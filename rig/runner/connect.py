@@ -119,7 +119,7 @@ class Connector:
             )
 
     def _build_early_end(self, plan: Plan, sweeps: int) -> EndingEarly | None:
-        """Return the condition for ending before the last repeat; None without a target, or for a verification."""
+        """Return the condition for ending before the last repeat; None if there is no target, or for a verification."""
         section, procedure = self.loaded.config.procedure, self.phase.procedure
         if procedure.reads_corrected or not isinstance(section, SixObservationSection):
             return None

@@ -56,7 +56,7 @@ class Run:
 
     - `script`: the script of the first phase.
     - `memory`: the sensors' earlier calibrations.
-    - `connecting`: the function that connects the turner; None for that of the turner's kind.
+    - `connecting`: the function that connects the turner; None for the function of the turner's kind.
     - `again`: the command that continues the run, if it is not `rig resume`.
     """
 

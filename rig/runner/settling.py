@@ -51,7 +51,7 @@ class _RecentReadings:
         return scatters
 
     def over_rest(self) -> list[float]:
-        """Return the ratios of the newest scatters to that at rest, the newest first; empty with too few readings."""
+        """Return the newest scatters divided by the scatter at rest, the newest first; empty with too few readings."""
         if not self.at_rest_counts:
             return []
         at_rest_counts = max(*self.at_rest_counts, MIN_SCATTER_COUNTS)
@@ -117,7 +117,7 @@ class Settling:
             return all(len(watched.at_rest_counts) >= SPANS_AT_REST for watched in self._watched.values())
 
     def find_unsettled(self) -> dict[str, float | None]:
-        """Return the unsettled sensors by name: their scatter relative to that at rest, None with too few readings."""
+        """Return, by name, each unsettled sensor's scatter divided by that at rest; None if it has too few readings."""
         with self._lock:
             over_rest = {watched.name: watched.over_rest() for watched in self._watched.values()}
         return {name: next(iter(ratios), None) for name, ratios in over_rest.items() if not _has_settled(ratios)}

@@ -155,7 +155,7 @@ class World:
             listener.set_silent(True)
 
     def close_arm(self, *, listen: bool) -> None:
-        """Close all connections of the controller; with `listen` the controller then accepts new ones."""
+        """Close all connections of the controller; if `listen`, the controller then accepts new ones."""
         for listener in self.arm_listeners:
             listener.hang_up() if listen else listener.close()
 

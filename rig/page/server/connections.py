@@ -48,7 +48,7 @@ class Connections:
 
     @contextmanager
     def answering(self, client: Client, *, has_token: bool) -> Iterator[None]:
-        """Mark a client whose complete request is answered in this block."""
+        """Suspend a client's time limit while its request is answered; a client with the token becomes trusted."""
         if (deadline := self._deadlines.pop(client, None)) is not None:
             deadline.cancel()
         if has_token and len(self._trusted) < MAX_TRUSTED and client in self._strangers:

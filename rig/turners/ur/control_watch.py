@@ -108,7 +108,7 @@ class ControlWatch:
         return self._newest_s() - since_s >= duration_s
 
     def _ask(self) -> ControlMode:
-        """Return whether the pendant is in remote control; None if unknown, "gone" without an answer."""
+        """Return whether the pendant is in remote control; None if unknown, "gone" if the controller is silent."""
         if self._is_x:
             return self._api.is_in_remote_control()
         for _ in range(2):  # some controllers close the connection on the change to local control; ask once more

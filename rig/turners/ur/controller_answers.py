@@ -122,7 +122,7 @@ def _read_description(host: str) -> ArmDescription:
 
 
 def _has_free_registers(host: str, version: tuple[int, ...]) -> bool | None:
-    """Return whether a half of the registers is free for the client; None without an answer of the controller."""
+    """Return whether a half of the registers is free for the client; None if the controller does not answer."""
     try:
         return find_free_half(host, version, CLOSED_PORT_TIMEOUT_S) is not None
     except OSError:

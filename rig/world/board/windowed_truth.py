@@ -96,7 +96,7 @@ def truth_document(truth: SimulatedTruth, windows: Mapping[str, Any], now_s: flo
     `windows` has two mappings by sensor name. `gyroscopes` gives the windows of the sweeps (`sweeps_s`) and of all
     averages (`averages_s`), and the speeds (`speeds_rad_s`). `accelerometers` gives the windows of all readings
     (`readings_s`). An empty list of windows stands for the whole time until `now_s`. A bias is a mean from the first to
-    the last window, as in the result. A scale factor that depends on the speed is left out unless there was one speed.
+    the last window, as in the result. A scale factor that depends on the speed is left out unless all speeds are equal.
     """
     whole = [(0.0, now_s)]
     document: dict[str, Any] = {"schema": SCHEMA, "simulated": True, "gyroscopes": {}, "accelerometers": {}}

@@ -27,8 +27,8 @@ OWNERS = (
 def find_free_half(host: str, version: tuple[int, ...], timeout_s: float) -> int | None:
     """Return the half of the registers that is free, `LOWER_FIRST` or `UPPER_FIRST`; None if neither half is free.
 
-    `host`, `version`: the controller and its software. Nothing remains reserved. Raise `OSError` without an answer in
-    `timeout_s`.
+    `host`, `version`: the controller and its software. Nothing remains reserved. Raise `OSError` if no answer comes
+    within `timeout_s`.
     """
     with socket.create_connection((host, PORT), timeout_s) as connection:
         deadline_s, received = time.monotonic() + timeout_s, bytearray()

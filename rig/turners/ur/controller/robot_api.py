@@ -25,7 +25,7 @@ MAX_WORD_CHARACTERS, MAX_ANSWER_CHARACTERS = 60, 160  # of an answer
 
 
 class RobotApi:
-    """The Robot API at `host` and `port`; methods return None without an answer within `timeout_s`."""
+    """The Robot API at `host` and `port`; methods return None if no answer comes within `timeout_s`."""
 
     def __init__(self, host: str, port: int, timeout_s: float) -> None:
         self._host, self._port, self._timeout_s = host, port, timeout_s

@@ -35,8 +35,8 @@ class StoredPrograms:
     def store(self, form: bytes, *, replace: bool) -> str:
         """Store the document in the `form` that a client sends, and return its name.
 
-        With `replace` the document must replace one of the same name; without `replace` its name must be new. Raise
-        ValueError for a wrong name, or if the form contains no document that can be stored.
+        If `replace`, the document must replace one of the same name; otherwise its name must be new. Raise ValueError
+        for a wrong name, or if the form contains no document that can be stored.
         """
         text = form[form.find(b"{") : form.rfind(b"}") + 1].decode()
         try:

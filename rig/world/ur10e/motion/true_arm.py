@@ -20,7 +20,7 @@ WRIST = 3  # the first joint that vibrates: those before it are mostly at rest
 def build_calibrated_links(
     calibration: CalibrationSection, twist_rad: tuple[float, ...] = ZERO6, nominal: LinkSizes = UR10E
 ) -> Links:
-    """Return the links as the maker measured them or, with `twist_rad` that the maker does not know, the true links."""
+    """Return the links as the maker measured them or, with errors `twist_rad` unknown to the maker, the true links."""
     return links(
         calibration.delta_theta_rad,
         [1e-3 * length for length in calibration.delta_a_mm],

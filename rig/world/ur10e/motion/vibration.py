@@ -11,7 +11,7 @@ WRISTS = (3, 4, 5)
 
 @dataclass(frozen=True, slots=True)
 class Vibration:
-    """A vibration of each wrist whose rate has the RMS `rms_rad_s`, divided equally among all tones.
+    """A vibration of each wrist. Its rate has the RMS `rms_rad_s`, to which all tones contribute equally.
 
     `tones`: angular frequencies in rad/s, each with the phases of the three wrists in rad.
     """

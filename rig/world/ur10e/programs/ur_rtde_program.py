@@ -30,7 +30,7 @@ Command = Callable[[], Steps]
 class SpeedTarget:
     """Target speeds of the joints, rad/s, and their acceleration, rad/s².
 
-    With `of_tool` the speeds are the tool's velocity in the base frame, m/s and rad/s; the acceleration is in m/s².
+    If `of_tool`, the speeds are the tool's velocity in the base frame, m/s and rad/s; the acceleration is in m/s².
     """
 
     speed: Joints

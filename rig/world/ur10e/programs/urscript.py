@@ -250,7 +250,7 @@ def _tcp(robot: Robot, value: Arguments) -> None:
 
 
 def _digital_out(first: int) -> Callable[[Robot, Arguments], None]:
-    """Return the statement that sets one of eight digital outputs, whose bits begin at bit `first`."""
+    """Return the statement that sets one of eight digital outputs; the first of them is bit `first`."""
 
     def put(robot: Robot, value: Arguments) -> None:
         number = int(value("0", "n"))
