@@ -1,4 +1,4 @@
-"""The world's clock: virtual time in ticks of 2 ms, paced against wall time and never made to jump."""
+"""The world's clock: virtual time in ticks of 2 ms, which is paced against wall time and never jumps."""
 
 from collections.abc import Callable
 

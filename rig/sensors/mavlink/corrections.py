@@ -1,4 +1,4 @@
-"""An autopilot's corrections of its readings, from its parameters: undone, or refused by name. Pure.
+"""An autopilot's corrections of its readings, as its parameters state them: undone, or refused by name. Pure.
 
 ArduPilot (AP_InertialSensor_Backend.cpp: _rotate_and_correct_gyro and _accel, apply_gyro_filters) subtracts the effect
 of temperature and an offset, scales accelerations, and rotates by AHRS_ORIENTATION from the axes of the board's

@@ -1,6 +1,7 @@
 """A simulated sensor: its mounting on the flange, and its readings of the flange's motion, with or without a board.
 
-The emulated sensors are made of `SensorTruth`. Studies and tests use it alone: `readings` takes arrays.
+An emulated sensor on a board has the errors and the mounting of a `SensorTruth`. Studies and tests use `SensorTruth`
+without a board; its method `readings` takes arrays.
 """
 
 from collections.abc import Sequence

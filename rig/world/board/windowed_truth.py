@@ -1,6 +1,6 @@
 """The truth of the simulated sensors over the windows of a run, for comparison with its result.
 
-The world writes it into a file of its own. Nothing that estimates reads that file.
+The world writes it into a file of its own. No estimator reads that file.
 """
 
 from collections.abc import Mapping, Sequence

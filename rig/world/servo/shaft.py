@@ -99,5 +99,5 @@ class Shaft:
 
 
 def whole_turns(angle_rad: float) -> float:
-    """Return the part of an angle, rad, that is whole revolutions: a loss of power makes the servo forget it."""
+    """Return the part of an angle, rad, that is whole revolutions, which a servo forgets if it loses power."""
     return angle_rad // (2 * pi) * 2 * pi

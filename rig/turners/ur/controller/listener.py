@@ -19,7 +19,7 @@ def resolve_address(host: str) -> IPv4Address | None:
 
 
 def is_loopback(host: str) -> bool:
-    """Return whether a host is this machine: its address is a loopback address."""
+    """Return whether a host's address is a loopback address, so that the host is this machine."""
     ip = resolve_address(host)
     return ip is not None and ip.is_loopback
 

@@ -95,7 +95,7 @@ class RobotApiStop:
             self.refusal = " ".join(filter(None, (f"HTTP status {status}", _message(body))))
 
     def program_running(self) -> bool:
-        """Raise `ConnectionError`: the Robot API is not asked about programs."""
+        """Raise `ConnectionError`, because the Robot API is not asked about programs."""
         raise ConnectionError("the Robot API is not asked")
 
     def close(self) -> None:

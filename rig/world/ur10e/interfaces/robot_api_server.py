@@ -109,7 +109,7 @@ class _PendingOrder:
 
 
 class RobotApiSession:
-    """The world's side of one connection: a request, its answer, and the end."""
+    """The world's side of one connection, which ends after one request and its answer."""
 
     dialogue = False
 
