@@ -88,7 +88,7 @@ class _Thinning:
 
 @dataclass(slots=True)
 class Acquisition:
-    """The data from the reader threads of the sources and the arm, read by the script's thread.
+    """The data that the reader threads of sources and turner deliver, and that the script's thread reads.
 
     The keys of `counts` are sensor names. Data that arrive before there is a `recorder` are not recorded. After the
     first call of `keep`, the data received since the last `KEPT_PARTS` calls of `keep` also stay in memory.
@@ -131,7 +131,7 @@ class Acquisition:
 
     @contextmanager
     def thin_states(self) -> Iterator[None]:
-        """Record only a few of the arm's states in the block, after its first seconds, because the arm is at rest.
+        """Record only a few of the arm's states after the first seconds of the block, in which the arm is at rest.
 
         Page and supervision still receive all states.
         """
@@ -181,7 +181,7 @@ class Acquisition:
             return tuple(count.summary for count in self.counts.values())
 
     def find_newest_readings(self, quantity: Scalar) -> dict[str, tuple[float, float]]:
-        """Return time, s, and value of the latest reading of each sensor of `quantity`, by name."""
+        """Return, by name, time (s) and value of the latest reading of each sensor that measures `quantity`."""
         with self._lock:
             heard = {name: (count.read_s, count.latest.get(quantity.name)) for name, count in self.counts.items()}
         return {name: (read_s, value[0]) for name, (read_s, value) in heard.items() if value is not None}

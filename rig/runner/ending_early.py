@@ -51,7 +51,7 @@ class EndingEarly:
     _home: int | None = None  # index of the motion that is still made after the end
 
     def __post_init__(self) -> None:
-        """Mark an assessment as due if a resumed run begins with a whole repeat."""
+        """Mark an assessment as due if the run was interrupted after a complete repeat, before the next."""
         remaining = [sweep.index for sweep in self.plan.sweeps]
         whole = (
             bool(remaining)

@@ -89,9 +89,10 @@ class Mounted:
 def find_mounted(
     sensors: Mapping[str, RecordedSensor], board: str | None, memory: Memory, *, simulated: bool
 ) -> Mounted:
-    """Return the sensors of a run that can be calibrated, on the board with the identifier `board`.
+    """Return the sensors of a run that can be calibrated, with their earlier calibrations.
 
-    `sensors` are by name. A calibration of a simulated sensor does not count for a real one, nor the reverse.
+    `sensors` are by name; `board` identifies the board, None without one. A calibration of a simulated sensor does not
+    count for a real one, nor the reverse.
     """
     turned = []
     for name, sensor in sensors.items():

@@ -274,7 +274,7 @@ def _add_notes(what: str, error: BaseException) -> str:
 
 
 def _notes(error: BaseException | None) -> Iterator[str]:
-    """Yield the notes of an error and of errors that it interrupted, such as a second Ctrl-C during the first."""
+    """Yield the notes of an error and of the errors before it, such as the first Ctrl-C before a second."""
     while error is not None:
         yield from getattr(error, "__notes__", ())
         error = None if error.__suppress_context__ else error.__context__

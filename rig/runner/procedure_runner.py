@@ -182,7 +182,7 @@ class Rig:
             raise Refused("not_confirmed", "nobody agreed to the movement", AGREEMENT_REMEDY)
 
     def _refuse_moved(self) -> None:
-        """Raise Refused `arm_moved` if the arm was moved, so that its path would differ from the announced one."""
+        """Raise Refused `arm_moved` if the arm was moved since the announcement, because its path would now differ."""
         moved_rad = max(map(abs, travel(self.plan.start_q_rad, self.devices.turner.latest.q_rad)), default=0.0)
         if moved_rad > MAX_POSE_DIFFERENCE_RAD:
             raise Refused(

@@ -26,7 +26,7 @@ class DevicePort(Protocol):
 class PortFaults:
     """The errors of a device if its port has closed, if it is silent, or if a consumer of its data has failed.
 
-    Each message is completed by a reason, or a duration.
+    When such an error is raised, the reason, or the duration of the silence, is added to its message.
     """
 
     closed: SensorError

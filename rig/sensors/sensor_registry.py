@@ -28,7 +28,7 @@ class SensorSource(SampleSource, Protocol):
 
 @dataclass(frozen=True, slots=True)
 class PartKind:
-    """The operations on a part's sensors at one port, given as sections by sensor name; errors are SensorErrors.
+    """The operations on sensors of one part at one port, which are given as sections by name. Errors are SensorErrors.
 
     - `connect`: returns a context manager of their source, set up, which passes their samples on.
     - `describe`: returns the description of a sensor's samples.

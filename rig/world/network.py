@@ -168,7 +168,7 @@ class ClientConnection:
 
 
 class PortListener:
-    """A listening port. At most `limit` clients are connected at a time; further ones are hung up on at once.
+    """A listening port. At most `limit` clients are connected at a time; a further client is disconnected at once.
 
     A client may lag `lag_s` of virtual time before the world waits for it. While more ticks are due, a port that
     `gathers` sends the bytes of several ticks together, as a USB adapter does, because every packet wakes its reader.

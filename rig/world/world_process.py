@@ -246,9 +246,9 @@ class World:
     def _tick(self) -> None:
         """Simulate one tick; if only a client can make the arm move, simulate up to `MAX_LEAP_TICKS` that are due.
 
-        If a board is emulated, ticks are simulated one at a time, because its processor takes most of the time, so that
-        clients would receive packets in bursts. If the arm is at rest, its motion is sensed once at the end of several
-        ticks, with the same bytes as a result. Every session is called at every tick.
+        An emulated board makes a tick slow. With one, ticks are therefore simulated one at a time, and clients do not
+        receive packets in bursts. If the arm is at rest, its motion is sensed once at the end of several ticks, with
+        the same bytes as a result. Every session is called at every tick.
         """
         for remaining in reversed(range(MAX_LEAP_TICKS if self.board_listener is None else 1)):
             self.clock.count()

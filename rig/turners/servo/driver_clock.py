@@ -26,7 +26,7 @@ class Clock(Protocol):
 
 
 class HostClock:
-    """The host's clock. If the host has a raw monotonic clock, which is never slewed, time stamps are of that clock.
+    """The host's clock. If the host has a raw monotonic clock, which is never slewed, states are stamped by that clock.
 
     The servo's clock (Realtime Tick) is unsuitable, because it counts milliseconds of an oscillator with 1 % tolerance.
     """

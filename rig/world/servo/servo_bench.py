@@ -28,8 +28,8 @@ BAUDS = {57600: 1, 115200: 2, 1_000_000: 3, 2_000_000: 4, 3_000_000: 5, 4_000_00
 class ServoBench:
     """A `MotionSource`: the shaft of the servo on the `bus`.
 
-    The servo lives in wall time, as does its client. The board lives in the world's ticks and may lag: its sensors then
-    sense the shaft's past.
+    The servo runs in wall time, as its client does. The board runs in the world's ticks and may lag behind the servo:
+    its sensors then sense the shaft's past motion.
     """
 
     def __init__(self, configured: ServoSection, world: WorldSection) -> None:

@@ -8,7 +8,7 @@ from rig.world.clock import TICK_S
 
 @dataclass(frozen=True, slots=True)
 class AtProgramStart:
-    """An action a fixed time after each program's start, as a fieldbus adapter without a connection performs it."""
+    """An action at a fixed time after each program's start, like that of a fieldbus adapter without a connection."""
 
     act: Callable[[], object]
     after_s: float
