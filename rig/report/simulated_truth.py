@@ -1,4 +1,4 @@
-"""The truth of a simulated laboratory next to the result: (result − truth)/U. Only people use it, no estimator."""
+"""The truth of a simulated laboratory next to the result, (result − truth)/U, for display; no estimator reads it."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass

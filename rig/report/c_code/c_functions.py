@@ -13,7 +13,10 @@ from rig.report.findings.finding import Finding
 
 
 def gyroscope_lines(finding: Finding[GyroscopeEntry], sensitivities: Mapping[str, Array]) -> Iterator[str]:
-    """Yield C source for a calibrated gyroscope; nothing for a reference gyroscope."""
+    """Yield C source for a calibrated gyroscope; nothing for a reference gyroscope.
+
+    `sensitivities` are the known g-sensitivities (3, 3), rad/s per m/s², by sensor.
+    """
     if finding.entry.role != "calibrate":
         return
     prefix, sensitivity = prefix_of(finding.sensor), sensitivities.get(finding.sensor)
@@ -35,7 +38,7 @@ def accelerometer_lines(finding: Finding[AccelerometerEntry], _: Mapping[str, Ar
 
 
 def magnetometer_lines(finding: Finding[MagnetometerEntry], _: Mapping[str, Array]) -> Iterator[str]:
-    """Yield C source for a magnetometer, whose correction is valid only while its mounting remains the same."""
+    """Yield C source for a magnetometer. The correction is valid only while the magnetometer's mounting is the same."""
     entry = finding.entry
     return _subtraction_lines(finding, entry.bias_t, entry.correction_matrix, "field_t", (
         f"/* Magnetometer {_comment(f'{entry.part}, serial number {entry.serial_number}')}: B = M (m - b), in tesla.",
@@ -74,7 +77,7 @@ def _correction(prefix: str, sensor: GyroscopeEntry) -> Iterator[str]:
 
 
 def _gravity_correction(prefix: str, sensitivity: Array) -> Iterator[str]:
-    """Yield C source of the correction that first subtracts the effect of gravity."""
+    """Yield C source of the function that subtracts the effect of gravity from readings and then calibrates them."""
     yield from (
         "",
         "/* The same, corrected for g-sensitivity: gravity_m_s2 points down, in the frame of the corrected",
@@ -131,5 +134,5 @@ def _array(values: Iterable[float]) -> str:
 
 
 def _comment(text: str) -> str:
-    """Return text without `*/`, which a serial number may contain and which would end the comment around the text."""
+    """Return the text with `*/` broken up: a serial number may contain it, and it would end the C comment."""
     return printable(" ".join(text.split())).replace("*/", "* /").replace("/*", "/ *")

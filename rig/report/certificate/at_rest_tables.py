@@ -19,7 +19,10 @@ MICRO = 1e6
 
 @dataclass(frozen=True, slots=True)
 class ReversalRow:
-    """One axis of a magnetometer's reversal; if `mixed`, it was not turned over, so `bias` has the arm's field."""
+    """One magnetometer axis after a reversal: its scale factor, its own bias, and the arm's field along it.
+
+    If `mixed`, this axis was not turned over. Then `bias` includes the arm's field, and `arm_field` is None.
+    """
 
     axis: str
     scale: Pair
@@ -30,9 +33,9 @@ class ReversalRow:
 
 @dataclass(frozen=True, slots=True)
 class DriftRow:
-    """The bias of one axis in the first and the last repeat of the attitudes, its largest change, and its `slope`.
+    """The bias of one axis in the first and the last repeat of the attitudes, and the largest change between repeats.
 
-    `slope` is the change with temperature, None if not determined.
+    `slope` is the bias change per degree of temperature, None if not determined.
     """
 
     axis: str

@@ -48,7 +48,7 @@ class CertifiedGyroscope:
 class RestCalibration:
     """The sensors of one `kind` that were calibrated at rest, and the reference standard of their scale factors.
 
-    `value` is the standard's stated value, `origin` the laboratory's statement of its source.
+    `value` is the standard's stated value, `origin` the laboratory's statement of where this value comes from.
     """
 
     kind: str
@@ -79,7 +79,7 @@ class Block:
 
     @property
     def macro(self) -> str:
-        """The name of the template's macro: `macro_path` after the file's name."""
+        """The name of the macro in this file."""
         return self.macro_path.partition(":")[2]
 
 
@@ -87,8 +87,9 @@ class Block:
 class Certificate:
     """The content of a certificate.
 
-    `marks` are printed across every page; a certificate without marks is ready to be signed. `reversals` are results of
-    turning magnetometers over, by the magnetometer's name.
+    `marks` are printed across every page; a certificate without marks is ready to be signed. `conformity` are the
+    checks against the limits of the configuration, `fitness` the measurement's checks of itself. `reversals` are
+    results of turning magnetometers over, by the magnetometer's name.
     """
 
     number: str
@@ -221,7 +222,7 @@ class Certificate:
 
     @property
     def guarded(self) -> bool:
-        """Whether a limit of conformity has a guard band of U."""
+        """Whether any limit of conformity is reduced by a guard band of U."""
         return any(check.guard_band > 0 for check in self.conformity)
 
 
@@ -320,7 +321,7 @@ def _marks(result: ResultDocument, stated: StatedFacts, fitness: Sequence[CheckE
 
 
 def _angles_rad(result: ResultDocument) -> Iterator[float]:
-    """Yield the known angles of sweeps; a file may state only their speeds."""
+    """Yield the angles of all sweeps, except those of which a file states only the speed."""
     for sensor in result.gyroscopes.values():
         yield from (turn.angle_rad for turn in sensor.observations if turn.angle_rad is not None)
     for verification in result.verification.values():
@@ -356,7 +357,7 @@ def _find_rest_calibrations(result: ResultDocument, stated: StatedFacts) -> Iter
 
 
 def _size_stated(budget: BudgetEntry) -> bool:
-    """Return whether the uncertainty of the reference standard is stated (normal), not an assumed half-width."""
+    """Return whether the standard's uncertainty was stated; in a budget such a one is normal, an assumed one is not."""
     return any(line.kind == "B" and line.distribution == "normal" for line in budget.contributors)
 
 

@@ -29,7 +29,7 @@ class StatedFacts:
 
     @property
     def where(self) -> SiteSection:
-        """The site; all its values are None if the configuration is missing."""
+        """The site of the laboratory. Without a configuration, all its values are None."""
         return self.site or SiteSection()
 
 

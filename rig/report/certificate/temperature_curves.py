@@ -17,7 +17,7 @@ FRACTION_UNITS = (DisplayUnit("%", 1e-2), DisplayUnit("ppm", 1e-6))
 
 @dataclass(frozen=True, slots=True)
 class Curves:
-    """A picture of curves: `axes` has the points, in SVG, of each axis' band and of its line.
+    """A picture of curves: `axes` has, for each sensor axis, the points of its band and of its line, as SVG text.
 
     `ticks` are labelled heights, `marks` labelled abscissas of temperatures, in pixels.
     """

@@ -75,7 +75,7 @@ def ardupilot_files(calibrations: ExportedCalibrations) -> Mapping[str, str]:
 def _lines(
     calibrations: ExportedCalibrations, autopilot: Autopilot, form: Callable[[str, float], str]
 ) -> Iterator[str]:
-    """Yield a line for each parameter, and comments on the sensor's calibration.
+    """Yield a line for each parameter, written by `form`, and comments on each sensor's calibration.
 
     Sensors are numbered in the order of the configuration; an accelerometer has its gyroscope's number. Raise Refused
     `nothing_to_export`.

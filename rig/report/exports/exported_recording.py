@@ -114,7 +114,7 @@ class ReadingsAlone:
         return ()
 
     def tables(self) -> Iterator[ExportTable]:
-        """Yield a table of each sensor's readings, as `rig solve` reads them, and the motion that a file describes."""
+        """Yield a table of each sensor's readings and, if a file describes the motion, a table of this motion."""
         external = self.run.external
         remark = f"Times are seconds of {self.clock}. {OMITTED_NOTE if external is None else OMITTED_FROM_FILES_NOTE}"
         for name, sensor in self.run.sensors.items():

@@ -1,4 +1,4 @@
-"""A calibration's biases at another temperature, by the slopes of a run of `bias_drift`. Pure.
+"""A calibration's biases at another temperature, computed from the slopes that a run of `bias_drift` measured. Pure.
 
 A slope is valid only in its measured range, which must contain the calibration's temperature and the requested one.
 """
@@ -21,7 +21,7 @@ DRIFT_QUANTITIES = (RATE, ACCELERATION)  # a run of `bias_drift` measures their 
 def move_to_temperature(
     calibrations: ExportedCalibrations, drift: ResultDocument, temperature_c: float
 ) -> ExportedCalibrations:
-    """Return the calibrations with biases at `temperature_c`, by the slopes in `drift`.
+    """Return the calibrations with their biases converted to `temperature_c` by the temperature slopes in `drift`.
 
     Raise Refused `another_sensor`, `temperature_slope_unknown`, `temperature_outside`.
     """

@@ -25,10 +25,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class AttitudePlot:
-    """A sensor in N attitudes; arrays (N, 3): residuals, and the standard deviations that are `expected` of them.
+    """The data of a sensor's plots: `residuals` (N, 3) of the mean readings in N attitudes.
 
-    `noise` (N, 3): the standard deviations of the mean readings due to noise. `towards` (N, 3): the reference, gravity
-    or the field, in the sensor's nominal axes.
+    `expected` (N, 3) are the standard deviations of the residuals that all known errors explain, `noise` (N, 3) those
+    that noise alone explains. `towards` (N, 3) is the reference (gravity or the field) in the sensor's nominal axes.
     """
 
     quantity: Quantity

@@ -180,5 +180,5 @@ RIG_CHARACTERISTICS: Final = (
 
 
 def every_characteristic() -> tuple[Characteristic, ...]:
-    """Return all characteristics in the order in which a history shows them; those of installed kinds are last."""
+    """Return all characteristics in the order in which a history shows them; those of installed packages are last."""
     return (*RIG_CHARACTERISTICS, *(row for kind in installed_kinds() for row in kind.result.characteristics))

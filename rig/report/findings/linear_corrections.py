@@ -42,7 +42,7 @@ class SensorCorrection:
     """The correction of one calibrated sensor: reading (3,) = `matrix` (3, 3) · true + `offset` (3,).
 
     - `full_scale` is None if it was not stated.
-    - `scale` (3,) is the factor along each axis, for programs that take no matrix.
+    - `scale` (3,) is the factor of each axis that converts readings to true values, for programs without a matrix.
     - `g_sensitivity` (3, 3): a gyroscope's g-sensitivity, rad/s per m/s².
     - `second_order`: whether an accelerometer has quadratic terms, which no other program supports.
     """

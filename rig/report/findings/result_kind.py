@@ -86,11 +86,13 @@ class CertifiedItem:
 
 @dataclass(frozen=True, slots=True)
 class Standard:
-    """The reference standard of the scale factors of sensors in known attitudes, for certificates.
+    """The statements of a certificate on the reference standard of a kind of sensor that is calibrated at rest.
 
-    `size` names the quantity that the standard realises, `quantity` names it if a file gives the motion. `value`
-    formats the standard's value from an entry; `origin` returns the laboratory's statement of the value's source.
-    `method` describes the measurement on an arm, with or without sweeps of a gyroscope.
+    - `size`: the name of the standard's quantity, such as "Gravity", for the beginning of a sentence.
+    - `value`: formats the standard's value from an entry.
+    - `origin`: returns the laboratory's statement of where this value comes from.
+    - `quantity`: the name of the standard's quantity within a sentence, if a file gives the motion.
+    - `method`: describes the measurement on an arm; its argument says whether gyroscope sweeps were made too.
     """
 
     size: str

@@ -128,7 +128,10 @@ def _describe_item(finding: Finding[DriftEntry], _: object) -> CertifiedItem:
 
 
 def drift_table(name: str, quantity: Quantity, entry: DriftEntry) -> Table:
-    """Return a table of the bias in each repeat, with scale and axes fixed, and the largest U; changes are marked."""
+    """Return a table of the bias in each repeat, estimated with scale and axes fixed.
+
+    A row has the largest U of the three axes, and the axis whose bias changed abruptly at this repeat, if any.
+    """
     unit, size = quantity.drift.name, quantity.drift.size
     expansion = expanded((1.0, 1.0, 1.0), entry.degrees_of_freedom)
     biases = (f"{axis} {unit}" for axis in "xyz")

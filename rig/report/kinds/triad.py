@@ -31,8 +31,11 @@ from rig.report.tables.budget import budget_table, heading_for
 class Words:
     """The texts of a kind of three-axis sensor; the functions build them from a finding or its entry.
 
-    The terminal prints `title` behind the sensor's name, the `model` of its readings, and `lines` below the table. The
-    digital certificate has scale and bias (`digital`, including a reversal if the run has one) and `temperatures_c`.
+    - `title`: printed behind the sensor's name on the terminal.
+    - `model`: returns the equation of the sensor's readings.
+    - `lines`: yields the lines below the table on the terminal.
+    - `digital`: yields scale and bias for the digital certificate, and the results of a reversal if there was one.
+    - `temperatures_c`: returns the temperatures of the readings for the digital certificate.
     """
 
     title: str
@@ -107,7 +110,10 @@ def attitude_lines(finding: Finding[Any]) -> Iterator[str]:
 
 
 def method_lines(entry: Any, quantity: Quantity, from_what: str = "") -> Iterator[str]:
-    """Yield a line for each other method, named with the suffix `from_what`: its solution, or why it has none."""
+    """Yield a line for each method that was not chosen: its solution, or why it has none.
+
+    The method's name in the line is followed by `from_what`.
+    """
     for method, other in entry.other_methods.items():
         if isinstance(other, ErrorEntry):
             yield f"{method}{from_what}: {other.error}"

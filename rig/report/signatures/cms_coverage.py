@@ -95,7 +95,10 @@ def _rebuild(container: Any, info: Any, signer: Any, version: str) -> Any:
 
 
 def _drop_parameters(algorithm: Any) -> Any:
-    """Return the algorithm without parameters, or with NULL if the original has it; `PSS_METHOD` keeps them."""
+    """Return the algorithm without parameters, or with NULL as parameters if the original has NULL.
+
+    The parameters of `PSS_METHOD` are part of the method and remain.
+    """
     name = algorithm["algorithm"].native
     if name == PSS_METHOD:
         return algorithm

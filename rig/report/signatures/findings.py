@@ -90,7 +90,7 @@ def list_signer_doubts(name: str, report: SignatureReport, why: str) -> list[Ref
 
 
 def stamp_not_trusted(name: str, server: str, why: str) -> Refused:
-    """Return the problem of a file whose time stamp is not trusted, and `why`; "" for an unknown server."""
+    """Return the problem of a file whose time stamp by `server` is not trusted; `why` is the reason, or empty."""
     return Refused(
         "signer_not_trusted",
         f"{name} has a time stamp by {server}, which is not trusted{why and f': {why}'}",

@@ -25,10 +25,11 @@ READER = f"{__name__}:read_inspection"
 
 
 def inspect_within_limits(file: Path, content: bytes, trust: Trust, limits: ReadingLimits = LIMITS) -> FileInspection:
-    """Return the inspection of a file with this `content`: see `inspect_file`.
+    """Return the inspection of a file with this `content`: its signatures and its problems.
 
-    A PDF or an XML of more than `LARGE_BYTES` is parsed in a process with these `limits`; one beyond them has the
-    problem `not_as_signed`. Raise Refused `missing_extra`, `temporary_folder_full`.
+    A PDF or an XML of more than `LARGE_BYTES` is parsed in a process of its own, with these `limits` of time and
+    memory. A file whose parsing exceeds them has the problem `not_as_signed`. Raise Refused `missing_extra`,
+    `temporary_folder_full`.
     """
     if len(content) <= LARGE_BYTES or not may_be_signed(content):
         return inspect_file(file.name, content, trust)

@@ -37,8 +37,8 @@ def why_untrusted(
     """Return why the signer, whose certificate begins this `chain` (DER), is not trusted; empty if trusted.
 
     The certificate must be valid at the `moment`, have a chain to a trusted certificate, be intended for signing
-    documents, and have the expected name. Its authorities must be authorities whose certificates allow this. Revocation
-    `lists`, if given, must cover the whole chain.
+    documents, and have the expected name. The certificates above it in the chain must permit their keys to issue
+    certificates for signing documents. Revocation `lists`, if given, must cover the whole chain.
     """
     from cryptography.x509 import load_der_x509_certificate
 
@@ -100,7 +100,7 @@ def _no_path(chain: Sequence[bytes], trust: Trust, moment: datetime, lists: "Seq
 
 
 def _unfit_authority(certificate: "Certificate") -> Iterator[str]:
-    """Yield reasons why an authority of this certificate vouches for no signer of documents."""
+    """Yield reasons why the owner of this certificate may not issue certificates for signing documents."""
     from cryptography.x509 import BasicConstraints
 
     name = certificate.subject.rfc4514_string()
@@ -111,7 +111,7 @@ def _unfit_authority(certificate: "Certificate") -> Iterator[str]:
 
 
 def unfit_for_documents(certificate: "Certificate") -> Iterator[str]:
-    """Yield reasons why a key with this certificate may not sign documents: its key usage, purposes or length.
+    """Yield reasons why the key of this certificate may not sign documents: its stated uses, its type or its length.
 
     A certificate without key usage is not accepted, although RFC 5280 (4.2.1.3) permits it all usages, because
     certificates of web servers from small authorities often state no key usage.
@@ -137,7 +137,7 @@ def _other_purposes(certificate: "Certificate") -> Iterator[str]:
 
 
 def _weak_key(certificate: "Certificate") -> Iterator[str]:
-    """Yield the fault of a certificate's key, if it is too short or neither RSA nor EC."""
+    """Yield a reason if the key of a certificate is too short, or is neither an RSA nor an EC key."""
     from cryptography.hazmat.primitives.asymmetric.ec import EllipticCurvePublicKey
     from cryptography.hazmat.primitives.asymmetric.rsa import RSAPublicKey
 
@@ -149,7 +149,7 @@ def _weak_key(certificate: "Certificate") -> Iterator[str]:
 
 
 def unfit_for_stamps(certificate: "Certificate", moment: datetime, now: datetime) -> Iterator[str]:
-    """Yield reasons why a time server of this certificate could not stamp at the time `moment` (RFC 3161, 2.3)."""
+    """Yield reasons why a time server with this certificate could not stamp at the time `moment` (RFC 3161, 2.3)."""
     from cryptography.x509 import ExtendedKeyUsage
     from cryptography.x509.oid import ExtendedKeyUsageOID
 

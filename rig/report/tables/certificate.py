@@ -63,7 +63,7 @@ def pair(value: float, uncertainty: float) -> Pair:
 
 
 def axis_rows(sensor: GyroscopeEntry) -> list[AxisRow]:
-    """Return a row for each gyroscope axis, with U from the budget or else with the noise's standard deviation."""
+    """Return a row for each gyroscope axis, with U from the budget, or with the statistical uncertainty without one."""
     return rows_of(sensor.scale, sensor.bias_rad_s, _widths(sensor), too=degrees_of(sensor)[1])
 
 
@@ -90,7 +90,7 @@ def rows_of(
 
 
 def degrees_of(sensor: GyroscopeEntry) -> tuple[str, float]:
-    """Return the second unit of printed biases, °/h if U is small and °/s otherwise, and its factor from rad/s."""
+    """Return the second unit of printed biases and its factor from rad/s: °/h if U is small, °/s otherwise."""
     return ("°/s", DEG) if DEG * max(_widths(sensor)[3:]) >= MAX_FINE_DEG_S else ("°/h", 3600 * DEG)
 
 
@@ -112,7 +112,10 @@ def check_row(check: CheckEntry) -> CheckRow:
 
 
 def verification_rows(entry: VerificationEntry) -> Iterator[tuple[str, ...]]:
-    """Yield a row for each axis: RMS and largest mean over a revolution, rad/s, before and after calibration."""
+    """Yield the cells of each axis: its errors, in rad/s, against the reference before and after calibration.
+
+    The order is RMS before and after, then the largest mean over a revolution before and after.
+    """
     for i, axis in enumerate(AXES):
         yield (
             axis,

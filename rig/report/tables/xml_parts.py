@@ -19,12 +19,12 @@ Part = Element | None
 
 
 def dcc(name: str, *parts: Part, **attributes: str) -> Element:
-    """Return an element of the certificate with its parts, without those that are None."""
+    """Return the element `name` of the DCC schema with its parts; parts that are None are left out."""
     return _extend(Element(f"{{{DCC}}}{name}", attributes), parts)
 
 
 def si(name: str, *parts: Part) -> Element:
-    """Return the element `name` of the D-SI schema with its parts."""
+    """Return the element `name` of the D-SI schema with its parts; parts that are None are left out."""
     return _extend(Element(f"{{{SI}}}{name}"), parts)
 
 

@@ -1,6 +1,6 @@
 """The measured mounting of the item in each stage of a run, in words. Pure.
 
-If each stage turns the item about only one axis, the mounting is not measured, and no words are yielded.
+If each stage turns the item about only one axis, the mounting cannot be measured, and these functions yield nothing.
 """
 
 from collections.abc import Iterator

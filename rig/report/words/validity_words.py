@@ -43,7 +43,10 @@ def when_words(when: ConditionsEntry) -> str:
 
 
 def warmth_words(when: ConditionsEntry | None) -> str:
-    """Return in words where a temperature comes from: the item's thermometer (if None), a statement, or nowhere."""
+    """Return the source of a temperature in words: the item's thermometer, a statement, or none.
+
+    Without `when` it is the thermometer.
+    """
     if when is not None and when.temperature_c is None:
         return "temperature neither measured by the item nor stated"
     if when is not None and when.temperature_stated:
@@ -57,7 +60,7 @@ def warmth(when: ConditionsEntry, use: str = "") -> dict[str, float | None]:
 
 
 def label_source(use: str) -> str:
-    """Return the label `use`, which `warmth` has made, completed by the source of the temperature."""
+    """Return a label that `warmth` made, with the source of the temperature added if the label does not name it."""
     return use if use.endswith(STATED_SUFFIX) else f"{use}, by its own thermometer"
 
 
@@ -91,7 +94,7 @@ def has_contributor(budget: BudgetEntry | None, name: str) -> bool:
 
 
 def list_omitted_rates(sensor: GyroscopeEntry, *, external: bool = False) -> str:
-    """Return the errors that a gyroscope's U omits; for external motion, also errors that readings do not show."""
+    """Return the errors that a gyroscope's U omits; if a file gives the motion (`external`), these are more."""
     bent = EXCLUSIONS if sensor.nonlinearity is not None else ("nonlinearity at other speeds", *EXCLUSIONS)
     return ", ".join(("the effect of gravity", *FILE_EXCLUSIONS, *bent) if external else bent)
 
