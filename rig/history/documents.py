@@ -73,7 +73,7 @@ def subject_entry(subject: Subject) -> dict[str, Any]:
 
 
 def trend_entry(trend: Trend) -> dict[str, Any]:
-    """Return the trend of a parameter for JSON, with null for what too few calibrations do not determine."""
+    """Return the trend of a parameter for JSON; a statistic that too few calibrations do not determine is null."""
     line, mean = trend.line, trend.mean
     return {
         "unit": trend.unit,
@@ -105,7 +105,10 @@ def change_entry(change: Change) -> dict[str, Any]:
 
 
 def rigs_document(states: Sequence[RigState], effects: Mapping[str, Sequence[RigEffect]]) -> dict[str, Any]:
-    """Return the state of rigs by check standards and shared sensors; effects on scale factors are fractions."""
+    """Return for JSON the control charts of each rig, and by parameter the `effects`: how results of rigs differ.
+
+    Effects on scale factors are fractions.
+    """
     return {
         "schema": SCHEMA,
         "rigs": [
@@ -150,7 +153,7 @@ def _parameter(parameter: Parameter) -> dict[str, Any]:
 
 
 def cell(value: object) -> object:
-    """Return a value that a spreadsheet reads as a text of one line or a number, not as a formula."""
+    """Return the value in a form that a spreadsheet reads as a number or as one line of text, never as a formula."""
     if not isinstance(value, str):
         return value
     line = " ".join(value.splitlines())

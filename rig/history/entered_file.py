@@ -16,18 +16,18 @@ from rig.history.store import History
 
 @dataclass(frozen=True, slots=True)
 class FileEntries:
-    """The entries of a file in words, and its problems by name."""
+    """A file in a history: its entries in words, and its problems."""
 
     entries: tuple[str, ...]
     problems: tuple[Refused, ...]
 
 
 def find_file_entries(history: History, name: str, content: bytes, anchor: tuple[int, str] | None) -> FileEntries:
-    """Return the entries of a file in the history, by its bytes or by the values of a result.json.
+    """Return the entries of a file in the history; the file is found by its bytes or, a result.json, by its values.
 
-    `anchor` is the journal entry that the file's signature names. Problems are `unknown_to_history` if the history does
-    not have the file, `not_as_entered` if its rows have changed since, `journal_rewritten` if the journal is not the
-    one at the time of the signature.
+    `anchor` is the last line of the journal when the file was signed, None without a signature. Problems are
+    `unknown_to_history` if the history does not have the file, `not_as_entered` if its rows have changed since their
+    entry, and `journal_rewritten` if the lines of the journal up to the anchor have changed since the signature.
     """
     with history.engine.connect() as connection:
         rows = list(_entries(connection, content))

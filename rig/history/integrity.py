@@ -26,7 +26,10 @@ MAX_SHOWN = 3  # of a run that are reported
 
 @dataclass(frozen=True, slots=True)
 class EntryState:
-    """The state of a file or entry: `what` is the path of the file or the number of the entry, `why` the reason."""
+    """The state of a file or of an entry, and the reason why it has this state.
+
+    `what` is the path of the file or the name and number of the entry.
+    """
 
     what: str
     state: State
@@ -34,10 +37,10 @@ class EntryState:
 
 
 def examine_history(history: History) -> Iterator[EntryState]:
-    """Yield the state of triggers, of the journal and its rows, of each run compared with its result, and of files.
+    """Yield the damages of the triggers and of the journal, then the state of each run and of the run's files.
 
-    Files are read at their last known location. A file of another computer that is not accessible here is `elsewhere`;
-    a file in a run's folder that was not entered is `unknown`.
+    A run is `ok` if its rows agree with its result. Files are read at their last known location. A file of another
+    computer that is not accessible here is `elsewhere`; a file in a run's folder that was not entered is `unknown`.
     """
     computer = platform.node()
     for entry in history.broken():
@@ -57,7 +60,7 @@ def examine_history(history: History) -> Iterator[EntryState]:
 
 
 def _contradictions(run: KeptRun, pasts: Sequence[Past]) -> Iterator[str]:
-    """Yield the first contradictions between the rows and the result of a run, then the number of the other ones."""
+    """Yield the first contradictions between a run's result and its rows in the tables, then the number of others."""
     try:
         if content_sha256(run.result) != run.content_sha256:
             yield "the result in the history is not as it was entered"
@@ -78,7 +81,10 @@ def _record(past: Past) -> HistoryRecord:
 
 
 def _files_by_folder(history: History) -> Mapping[str, set[tuple[str, str]]]:
-    """Return name and SHA-256 of the files entered from each folder; a resumed run was entered repeatedly."""
+    """Return name and SHA-256 of all files that were entered from each folder, by the folder's path.
+
+    A folder whose run was resumed was entered repeatedly, so a name may have several checksums.
+    """
     by_folder: dict[str, set[tuple[str, str]]] = {}
     for path, name, sha256 in history.files():
         by_folder.setdefault(path, set()).add((name, sha256))
@@ -133,7 +139,10 @@ def _unknown(folder: Path, entered: Mapping[str, set[tuple[str, str]]]) -> Itera
 
 
 def _names(run: KeptRun, folder: Path) -> set[str]:
-    """Return the names of the entered files, without results and certificates that are not in this folder."""
+    """Return the names of the run's files to look for in this folder.
+
+    These are its documents and, only if they are present, its result and its certificates.
+    """
     possible = {RESULT, *(name for certificate in run.certificates for name, _ in certificate.files)}
     return {name for name, _ in run.documents} | {name for name in possible if (folder / name).exists()}
 

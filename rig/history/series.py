@@ -107,7 +107,10 @@ class Trend:
 
 @dataclass(frozen=True, slots=True)
 class RigState:
-    """The state of one rig by all its check standards: a chart of each parameter, in the order of time."""
+    """The state of one rig: for each parameter, a control chart of the results of all its check standards.
+
+    `standards` are their serial numbers. The deviations in a chart are in the order of time.
+    """
 
     rig: str
     standards: tuple[str, ...]
@@ -197,7 +200,10 @@ def changes_between(before: Sequence[Past], now: Sequence[Past]) -> dict[Subject
 
 
 def rig_states(pasts: Sequence[Past]) -> list[RigState]:
-    """Return the state of every rig that calibrated a check standard: a sensor that was ever declared to be one."""
+    """Return the state of every rig that calibrated a check standard.
+
+    A sensor is a check standard if the configuration of any of its runs declared it to be one.
+    """
     # Drifts and curves are not standards, and external readings have no rig.
     by_subject = subjects([past for past in pasts if past.quantity in quantities() and past.rig != NO_ARM])
     standards = {key: series for key, series in by_subject.items() if any(past.check_standard for past in series)}

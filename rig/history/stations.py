@@ -52,9 +52,10 @@ _NOW: Mapping[str, str] = {
 
 @dataclass(frozen=True, slots=True)
 class StationState:
-    """The last state of the station of a `rig` on a `computer`, as JSON, and its age; None if the age is unknown.
+    """The last `state`, as JSON, that a station stored: the station of this `rig` on this `computer`.
 
-    Every user with write access to the history can change a station's state.
+    `age_s` is the age of the state, None if unknown. Every user with write access to the history can change a station's
+    state.
     """
 
     rig: str

@@ -90,10 +90,13 @@ class EnteredRun:
 
 @dataclass(frozen=True, slots=True)
 class KeptRun:
-    """A run as it was entered: its result, its recordings, and its folder's locations, the newest first.
+    """A run as it was entered.
 
-    `certificates`: in the order of entry; `documents`: name and SHA-256 of its folder's other files; `row`: all other
-    columns of the run's row.
+    - `result`: the text of result.json; `content_sha256`: its checksum.
+    - `recordings`: name, size and SHA-256 of each recording; `documents`: name and SHA-256 of each other file.
+    - `places`: computer and path of each location of its folder, the newest first.
+    - `certificates`: in the order of entry.
+    - `row`: all other columns of the run's row.
     """
 
     run_id: int
@@ -108,7 +111,7 @@ class KeptRun:
 
 @contextmanager
 def open_history(where: str | HistoryAddress | None = None) -> Iterator["History"]:
-    """Open a history, given by file or URL, for the block, by default the user's own; make or migrate its tables.
+    """Open the history at a file or URL, by default the user's own, for the block; make or migrate its tables.
 
     Raise Refused `history_unreachable`, `history_too_old`, `history_too_new`, `not_a_history`, `missing_extra`;
     `history_gone` or `history_exchanged` if this process has opened it before and it is missing or has been replaced.
@@ -181,7 +184,8 @@ class History:
     def calibrations(self, selection: Selection = Selection(), *, replaced_too: bool = False) -> list[Past]:
         """Return calibrations in the order of time, including voided ones.
 
-        Calibrations that a later one of their run has replaced are included only on request.
+        A calibration is replaced by a later result of the same measurement. With `replaced_too`, replaced ones are
+        included.
         """
         question = select(*_COLUMNS).select_from(_ROWS).order_by(*_IN_TIME)
         return self._pasts(chosen(question if replaced_too else question.where(~replacement_condition()), selection))
@@ -212,7 +216,7 @@ class History:
             journal.note(connection, schema.voided, number)
 
     def kept(self, run_id: int | None = None) -> Iterator[KeptRun]:
-        """Yield all runs, or one, as they were entered, in the order of entry."""
+        """Yield the run `run_id`, or by default all runs in the order of entry, as they were entered."""
         question = select(schema.run).order_by(schema.run.c.id)
         if run_id is not None:
             question = question.where(schema.run.c.id == run_id)
@@ -243,7 +247,7 @@ class History:
             yield from journal.broken(connection)
 
     def head(self) -> journal.Head:
-        """Return the end of the journal, which a later check compares with what it finds."""
+        """Return the last line of the journal, with which a later check shows whether the journal was rewritten."""
         with self.engine.connect() as connection:
             return journal.head(connection)
 
@@ -313,7 +317,7 @@ def replacement_condition() -> Any:
 
 
 def chosen(question: Select[*tuple[Any, ...]], selection: Selection) -> Select[*tuple[Any, ...]]:
-    """Return the query `question`, for runs or for their calibrations, restricted to the selection."""
+    """Return `question`, a query for runs or for their calibrations, restricted to the selection."""
     if selection.serial_number is not None:
         question = question.where(_CALIBRATION.serial_number == selection.serial_number)
     if selection.part is not None:

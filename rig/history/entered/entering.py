@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def enter_run(connection: Connection, finished: FinishedRun, content_sha256: str) -> int:
-    """Add a run with all that belongs to it; return its number."""
+    """Add a run with its recordings, documents and calibrations, and their line of the journal; return its number."""
     from rig.history.entered.index import run_row
     from rig.report.kinds.kind_registry import history_records
 

@@ -1,4 +1,4 @@
-"""The columns of a run's row that repeat values of its result: written on entry, compared later. Pure."""
+"""The columns of a run's row that repeat values of its result: written on entry, later compared with it. Pure."""
 
 import hashlib
 import math
@@ -50,7 +50,7 @@ def utc(text: str) -> str:
 
 
 def unlike(document: ResultDocument, recomputed: Sequence[HistoryRecord]) -> Iterator[str]:
-    """Yield the differences of `recomputed` calibrations from the document's; the rounding of processors is allowed."""
+    """Yield the differences, beyond the rounding of processors, of `recomputed` calibrations from the document's."""
     stated = {(record.sensor, record.quantity): record for record in history_records(document)}
     present = {(record.sensor, record.quantity): record for record in recomputed}
     for sensor, quantity in sorted(stated.keys() ^ present.keys()):

@@ -18,9 +18,9 @@ UNCOMPARED_FIELDS = ("iterations", "solved_utc")  # the same result may take oth
 def differing_parts(claimed: ResultDocument, recomputed: ResultDocument) -> list[str]:
     """Return the parts of a `claimed` result that differ from the recomputed one by more than processors' rounding.
 
-    `recomputed` is solved from the recordings. Calibrations agree within 1e-6 of their standard uncertainty, other
-    numbers within 1e-6 of the largest in their list. Texts, and fields that the claimed result lacks, are not compared,
-    because they change from version to version.
+    `recomputed` is solved from the recordings. Calibrations must agree within 1e-6 of their standard uncertainty, other
+    numbers within 1e-6 of the largest number in their list. Texts, and fields that the claimed result lacks, are not
+    compared, because they change from version to version.
     """
     origin = _origin(recomputed)
     rows = [f"provenance.{name}" for name, value in _origin(claimed).items() if value != origin.get(name)]
@@ -64,7 +64,11 @@ def _numbers_of(document: ResultDocument) -> dict[str, object]:
 
 
 def _differences(claimed: object, recomputed: object, where: str, scale: float = 0.0) -> Iterator[str]:
-    """Yield the paths at which the claimed document differs from the recomputed one by more than rounding."""
+    """Yield the paths at which the claimed document differs from the recomputed one by more than rounding.
+
+    `where` is the path of both documents in the whole result. `scale` is the largest number of the list that contains
+    them, to which rounding is relative; 0 outside of lists.
+    """
     if isinstance(claimed, Mapping) and isinstance(recomputed, Mapping):
         for name, item in claimed.items():
             if name not in recomputed:

@@ -1,7 +1,7 @@
 """The journal of a recomputation: a line for each solved recording, so that no recording is solved twice.
 
-The first line states program, settings and estimator. A journal with another first line is not continued, so that all
-its answers are comparable.
+The first line states program, settings and estimator. A journal whose first line states others is not continued, so
+that all answers in a journal are comparable.
 """
 
 import json

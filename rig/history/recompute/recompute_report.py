@@ -38,7 +38,10 @@ STATE_WORDS = {
 
 
 def recompute_csv(outcome: RecomputeOutcome) -> str:
-    """Return CSV, a line for each calibration (its most changed parameter) and for each run without calibrations."""
+    """Return CSV with a line for each calibration, which states its most changed parameter.
+
+    A run without calibrations has one line.
+    """
     out = io.StringIO(newline="")
     writer = csv.DictWriter(out, COLUMNS, lineterminator="\n", restval="")
     writer.writeheader()
@@ -66,7 +69,7 @@ def recompute_page(outcome: RecomputeOutcome, question: RecomputeQuestion, histo
 
 
 def counts(outcome: RecomputeOutcome) -> Iterator[str]:
-    """Yield lines with the numbers of results, of changes, and of certificates to withdraw or left unconfirmed."""
+    """Yield lines that state how many results were solved and have changed, and how many certificates are affected."""
     unsolved = [f"{count} {STATE_WORDS[state]}" for state, count in sorted(outcome.unsolved.items())]
     unsolved += [f"{outcome.unreached} not reached"] if outcome.unreached else []
     yield f"{len(outcome.compared)} results: {', '.join([f'{outcome.solved} solved', *unsolved])}"

@@ -23,9 +23,9 @@ State = Literal["refused", "unjudged", "missing", "damaged", "lost", "failed"]
 class StatedResult:
     """A result of the history, with its recordings and the certificates that rely on it.
 
-    - `run_id`, `content_sha256`, `started_utc`, `rig`, `verdict`: the run.
-    - `calibrations`: the selected valid calibrations.
-    - `recordings`: the run's recordings. `places`: their computers and folders, the newest first.
+    - `run_id`, `content_sha256`, `started_utc`, `rig`, `verdict`: the run's row in the history.
+    - `calibrations`: the run's calibrations that are valid and selected for recomputation.
+    - `recordings`: the run's recordings. `places`: computer and folder of each location, the newest first.
     - `certificates`: the certificates in force, that is valid and not replaced by another.
     """
 
@@ -199,7 +199,10 @@ class RecomputeOutcome:
 def match_answers(
     stated: Iterable[StatedResult], answers: Mapping[str, Answer], of_u: float = U_FRACTION
 ) -> RecomputeOutcome:
-    """Return each result with the answer under the result's checksum, if any; `of_u` is as in `ComparedResult`."""
+    """Return each stated result with its answer, if any; `answers` are keyed by the checksum of the stated result.
+
+    A value counts as changed if it moved by more than `of_u` × stated U.
+    """
     return RecomputeOutcome(
         of_u, tuple(ComparedResult(result, answers.get(result.content_sha256), of_u) for result in stated)
     )

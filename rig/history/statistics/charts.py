@@ -69,9 +69,10 @@ def merge_charts(deviations: Array) -> Chart:
 
 
 def step(average: Array, deviation: Array, before: int) -> tuple[Array, float]:
-    """Return the moving `average` (EWMA) with one more deviation, after `before` earlier ones, and its limit.
+    """Return the moving `average` (EWMA) after one more deviation, and the limit of this average.
 
-    Shewhart's chart detects single outliers, so deviations are clipped to its limit before they enter the average.
+    `before` is the number of earlier deviations, from which the limit follows. Shewhart's chart detects single
+    outliers, so deviations are clipped to its limit before they enter the average.
     """
     smoothed = (1 - SMOOTHING) * average + SMOOTHING * np.clip(deviation, -SHEWHART_LIMIT, SHEWHART_LIMIT)
     settled = 1 - (1 - SMOOTHING) ** (2 * (before + 1))

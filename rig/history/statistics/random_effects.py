@@ -11,9 +11,10 @@ CONFIDENCE = 0.95
 
 @dataclass(frozen=True, slots=True)
 class FittedModel:
-    """The coefficients (p,), their covariance (p, p), and `between_std`, the scatter beyond the values' stated stds.
+    """The coefficients (p,) of a fitted model, and their covariance (p, p).
 
-    `dof` is the number of values minus that of coefficients.
+    `between_std` is the standard deviation of the scatter that the values' stated stds do not explain. `dof` is the
+    number of values minus the number of coefficients.
     """
 
     coefficients: Array

@@ -25,7 +25,7 @@ ENTRY_TABLES: Mapping[str, Table] = {
 
 @dataclass(frozen=True, slots=True)
 class Broken:
-    """An inconsistency of a history: `what` has changed or is missing (`state`), and `why`."""
+    """An inconsistency of a history: `what` is inconsistent, whether it has changed or is missing, and `why`."""
 
     what: str
     state: Literal["changed", "missing"]
@@ -47,7 +47,10 @@ def lock_out_writers(connection: Connection) -> None:
 
 
 def note(connection: Connection, table: Table, *key: int | str) -> None:
-    """Enter the hash of the row of `table` with this key, and of a run's parts. Call `lock_out_writers` before."""
+    """Add a line with the hash of the row of `table` that has this primary `key`. Call `lock_out_writers` before.
+
+    The hash of a run's row also covers the rows of the run's recordings, documents, calibrations and parameters.
+    """
     before = head(connection)
     line = {
         "number": before.number + 1,
@@ -92,7 +95,7 @@ def _link(before: str, line: Mapping[Any, Any]) -> str:
 
 
 def broken(connection: Connection) -> Iterator[Broken]:
-    """Yield rows that differ from the journal or are not in the journal, and gaps and breaks of the journal's chain."""
+    """Yield all rows that differ from the journal or that it lacks, and all gaps and breaks in its chain."""
     remaining = {
         (name, json.dumps(tuple(key))): (table, tuple(key))
         for name, table in ENTRY_TABLES.items()

@@ -20,10 +20,11 @@ SILENCE_TIMEOUT_S = 5  # after which an unresponsive connection is closed
 
 
 def connect_arguments(server: "URL", environment: Mapping[str, str] = os.environ) -> dict[str, str | int]:
-    """Return the options of a connection, which to another computer is always encrypted and authenticated.
+    """Return the options of a connection. To another computer, it is always encrypted and authenticated.
 
-    On this computer there is no network to listen on, and the system may authenticate the user without a password. A
-    user may require more encryption by PGSSLMODE, and another method, such as `gss`, by PGREQUIREAUTH.
+    A connection within this computer needs neither: no network carries it, and the system may authenticate the user
+    without a password. A user may require more encryption by PGSSLMODE, and another method of authentication, such as
+    `gss`, by PGREQUIREAUTH.
     """
     is_local = _is_on_this_computer(server, environment)
     options: dict[str, str | int] = {

@@ -11,9 +11,10 @@ from rig.history.storage.journal import Head
 
 
 def refuse_lost(connection: Connection, address: HistoryAddress, before: Head, after: Head) -> None:
-    """Raise Refused `entry_not_kept` if entries between two ends of the journal are missing or changed.
+    """Check the entries that lines of the journal record: the lines after `before`, up to `after`.
 
-    Also raise as `continuity.refuse_another` does.
+    Raise Refused `entry_not_kept` if an entry or the last line is missing or changed. Also raise as
+    `continuity.refuse_another` does.
     """
     if not journal.has(connection, after):
         raise _entry_not_kept(address, f"entry {after.number} of its journal")

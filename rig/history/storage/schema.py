@@ -1,7 +1,7 @@
 """The tables of a history. Rows are only added, never changed, as the modules `triggers` and `journal` ensure.
 
-`run.result` holds the complete `result.json`. All other columns of runs, calibrations and parameters repeat parts of it
-for searches.
+`run.result` is the complete `result.json`. The tables of calibrations and parameters, and most other columns of a run,
+repeat values of it so that queries can find them.
 """
 
 from typing import Any

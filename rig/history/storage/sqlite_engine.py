@@ -86,7 +86,10 @@ def sqlite_engine(file: Path, label: str, *, new: bool = False) -> Engine:
 
 
 def _connect_to_write(file: Path, *, new: bool) -> sqlite3.Connection:
-    """Return a connection whose write-ahead log serves readers and a writer at once, but not on network shares."""
+    """Return a connection that writes by a write-ahead log (WAL), so readers need not wait for a writer.
+
+    A write-ahead log does not work on network shares.
+    """
     connection = _connect(file, "mode=rwc" if new else "mode=rw")
     if not new:
         refuse_unmarked(connection, file)
@@ -100,7 +103,8 @@ def _connect_to_write(file: Path, *, new: bool) -> sqlite3.Connection:
 def _connect_to_read(file: Path) -> sqlite3.Connection:
     """Return a connection for reading only, to a file in a folder in which the user cannot create files.
 
-    A writer would keep a log in that folder. Without a log the file does not change during reading, and needs no lock.
+    If the file is open for writing, its write-ahead log is in that folder. Without a log, nothing changes the file
+    during reading, so no lock is needed.
     """
     log = file.with_name(f"{file.name}-wal")
     return _connect(file, "mode=ro" if log.exists() else "mode=ro&immutable=1")

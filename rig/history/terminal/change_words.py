@@ -1,4 +1,4 @@
-"""Changes from one calibration of a sensor to another calibration of this sensor, in sentences. Pure."""
+"""Changes between two calibrations of a sensor, in sentences. Pure."""
 
 from collections.abc import Iterable, Sequence
 from math import pi
@@ -49,7 +49,7 @@ def name_in_words(name: str) -> str:
 
 
 def _size_words(change: Change) -> str:
-    """Return the size of a change with its sign, for a scale factor as a fraction, otherwise in the displayed unit."""
+    """Return the size of a change with its sign: as a fraction for a scale factor, otherwise in the displayed unit."""
     difference = change.now.value - change.before.value
     if is_scale(change.name):
         relative = difference / change.before.value

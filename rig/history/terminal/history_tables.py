@@ -34,7 +34,7 @@ def calibrations_table(pasts: Sequence[Past]) -> FittingTable:
 
 
 def trends_table(subject: Subject, trends: Sequence[Trend]) -> FittingTable:
-    """Return a table of each parameter: its last value, drift, scatter and control chart, and its recall date."""
+    """Return a table with a row for each parameter: last value, drift, scatter, control chart and recall date."""
     columns = (
         TableColumn("parameter", [_add_unit(trend.name, trend.unit) for trend in trends]),
         TableColumn("trend", [picture(trend) for trend in trends], rank=1),
