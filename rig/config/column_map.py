@@ -41,7 +41,7 @@ class ColumnSection(Section):
     @field_validator("column", mode="before")
     @classmethod
     def convert_number_to_text(cls, value: object) -> object:
-        """Return a column's number as the text that a file has."""
+        """Return a column that is given as an integer as text, because a file's headings are texts."""
         return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
 
     @field_validator("unit")
@@ -55,7 +55,7 @@ class ColumnSection(Section):
     @field_validator("factor", "lsb_per_unit")
     @classmethod
     def refuse_zero(cls, value: float | None) -> float | None:
-        """Refuse zero, and numbers that are impossible as the size of a sensor's unit."""
+        """Refuse zero, and numbers too small or too large for the size of a sensor's unit."""
         if value is not None and not MIN_FACTOR < abs(value) < 1 / MIN_FACTOR:
             raise ValueError(f"must be between {MIN_FACTOR:g} and {1 / MIN_FACTOR:g}, of either sign")
         return value

@@ -107,10 +107,10 @@ def load(
 
 
 def load_sensors(path: str | Path, overrides: Sequence[str] = ()) -> tuple[SensorsConfig, str | None]:
-    """Read the sensors' part of a configuration; also return its text as `Loaded.laboratory` does.
+    """Return the sensors' part of a configuration, and the file's text for the simulated laboratory.
 
-    A file with a `world:` section must be complete, because the laboratory simulates all of it. Raise
-    `ConfigurationRefused`.
+    The text is None if the file has no `world:` section. A file that has one must be complete, because the laboratory
+    simulates all of it. Raise `ConfigurationRefused`.
     """
     with _refusing_unreadable(str(path)):
         layered = read_layers(Path(path), overrides)
@@ -155,7 +155,7 @@ def parse(
 
 @contextmanager
 def _refusing_unreadable(source: str, give: str = CONFIGURATION_REMEDY) -> Iterator[None]:
-    """Raise `ConfigurationRefused` for a text that cannot be read at all; `give` is then the remedy."""
+    """Convert the error of a text that cannot be read at all into `ConfigurationRefused`, with `give` as remedy."""
     try:
         yield
     except Unreadable as error:
@@ -389,7 +389,7 @@ def _world_fits(config: RigConfig, world: WorldSection) -> Iterator[str]:
 
 
 def _instruments_fit(config: RigConfig, world: WorldSection) -> Iterator[str]:
-    """Yield a conflict for each simulated instrument at a port at which the rig has another sensor."""
+    """Yield a conflict for each sensor that the world simulates as an instrument that the rig does not read there."""
     for name in sorted(config.sensors.keys() & world.sensors.keys()):
         where = "the sensor is on the board" if name in config.on_board else "the sensor is at another's port"
         if world.sensors[name].kvh1775 is not None and config.sensors[name].part != "kvh1775":

@@ -238,7 +238,11 @@ class SensorsConfig(Section):
     @field_validator("sensors")
     @classmethod
     def match_sensors(cls, sensors: dict[str, SensorSection]) -> dict[str, SensorSection]:
-        """Refuse two sensors of one part, port, IMU or name, an overloaded port, two references, or only references."""
+        """Refuse sensors that share a source or a name, an overloaded port, and other than one or no reference.
+
+        The source of a sensor is its part on the board, its own port, or an IMU of an autopilot. At least one sensor
+        must be one to calibrate.
+        """
         sensor_at: dict[str, str] = {}
         for name, sensor in sensors.items():
             if sensor.mavlink is not None:
@@ -269,7 +273,7 @@ class SensorsConfig(Section):
     def check_link_rate(cls, sensors: dict[str, SensorSection], info: ValidationInfo) -> dict[str, SensorSection]:
         """Refuse sensors on a missing board, and data rates beyond the link's capacity.
 
-        A sensor to calibrate sends raw and later corrected readings; the larger messages of the two count.
+        The board sends raw readings of a sensor to calibrate, and later corrected ones; the larger messages count.
         """
         streams = _streams(sensors)
         if "board" not in info.data or not streams:
@@ -323,9 +327,9 @@ class SensorsConfig(Section):
 
 
 class RigConfig(SensorsConfig):
-    """The configuration of the rig, which does not know whether the far end is simulated.
+    """The complete configuration of a rig, without the `world:` section of a simulated laboratory.
 
-    `turner` turns the sensors; a file states it under `turner` with its kind, or an arm under `arm`.
+    `turner` turns the sensors. A file states it under `turner`, with its kind, or under `arm` if it is an arm.
     """
 
     turner: TurnerSection
@@ -341,7 +345,10 @@ class RigConfig(SensorsConfig):
 
 
 def _device_sensor_names(sensors: Mapping[str, SensorSection]) -> list[str]:
-    """Return the names of the further sensors in the devices of `sensors`: magnetometers and sensors of one number."""
+    """Return the names of the sensors that the devices of `sensors` contain in addition to gyroscopes.
+
+    These are magnetometers, and sensors of quantities without axes.
+    """
     return [bundled for name, sensor in sensors.items() for bundled in sensor.brings(name)]
 
 

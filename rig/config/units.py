@@ -72,7 +72,7 @@ _SMALL = {name.casefold(): name for name in reversed([*UNITS]) if len(name) > 1}
 
 
 def find_unit(spelling: str) -> str:
-    """Return a unit that is spelled in words or with other capitals, as `UNITS` spells it, or "" if it is unknown."""
+    """Return the key of `UNITS` for a unit spelled in words or with other capitals; "" for an unknown unit."""
     if spelling.strip() in UNITS:
         return spelling.strip()
     text = spelling.strip().casefold()

@@ -21,7 +21,7 @@ class RigError(ProblemError):
 
 
 class Refused(RigError):
-    """A refusal of the configuration or the pre-flight tests; nothing has moved (exit status 2)."""
+    """An action that the configuration or the pre-flight tests forbid; nothing has moved (exit status 2)."""
 
     exit_status = 2
 
@@ -46,7 +46,7 @@ def or_fault(solve: Callable[[], Result]) -> Result | Fault:
 
 @contextmanager
 def raise_as(kind: type[RigError]) -> Iterator[None]:
-    """Raise problems of board or recording in the block as `kind`; Refused remains unchanged."""
+    """Convert errors of the board or of a recording, raised in the block, into `kind`; Refused remains unchanged."""
     try:
         yield
     except ProblemError as error:

@@ -1,7 +1,7 @@
-"""Independent attempts, some of which may fail: only here is a Fault a value instead of an exception.
+"""Independent attempts, some of which may fail: only here is a Fault stored as a value.
 
-A Fault is raised if nothing can continue. Otherwise `attempt_each` and `attempt` store the Fault in `faults`, by the
-name of the attempt, never in place of a result.
+Everywhere else a Fault is raised, because nothing can continue after it. `attempt_each` and `attempt` store the Fault
+of a failed attempt in `faults`, by the name of the attempt, never in place of a result.
 """
 
 from collections.abc import Callable, Iterable, Mapping

@@ -26,8 +26,8 @@ def load_entry_points(
 
 @cache
 def _entry_points(_: tuple[str, ...]) -> Any:
-    """Return all entry points of the packages on the search path, cached because looking takes 10 ms.
+    """Return the entry points of all packages on the search path (the argument), cached because this takes 10 ms.
 
-    Python 3.11 and 3.12 have them in different classes; both have `select`.
+    Python 3.11 and 3.12 return objects of different classes; both have the method `select`.
     """
     return entry_points()

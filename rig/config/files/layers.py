@@ -103,7 +103,7 @@ def _layers(text: str, path: Path | None) -> Iterator[_Layer]:
 
 
 def _layer(text: str, name: str) -> _Layer:
-    """Return the layer in one file's text; only a base file has a `name`."""
+    """Return the layer in one file's text. `name` is that of a base file, "" for the file itself."""
     try:
         document = read_yaml(text)
         if not isinstance(document.data, dict):

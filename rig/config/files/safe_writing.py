@@ -16,9 +16,10 @@ NO_FOLLOW_FLAG = getattr(os, "O_NOFOLLOW", 0)
 
 @contextmanager
 def replace_together() -> Iterator[None]:
-    """Move all files written in this block to their paths at its end, in reverse order of writing.
+    """Keep the files that `new_file` writes in this block under temporary names, and move them at the block's end.
 
-    If the block raises an error, or a file cannot be moved, the new files that have not been moved yet are removed.
+    They are moved in reverse order of writing. If the block raises an error, or a file cannot be moved, the files that
+    have not been moved yet are removed.
     """
     parts: dict[Path, Path] = {}
     token = _held_back.set(parts)

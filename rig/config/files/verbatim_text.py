@@ -11,9 +11,9 @@ from rig.config.files.yaml_text import Location
 
 
 def take_text_as_written(model: type[BaseModel], data: Any, prefix: Location, written: Mapping[Location, str]) -> None:
-    """Restore the texts in `data`, a section of `model` at `prefix`, to their spelling in the file (`written`).
+    """Restore in place the texts of a section (`data`) of type `model` at `prefix` to their spelling in the file.
 
-    YAML reads a serial number 0017 as 15, and 2026-11-20 as a date.
+    YAML reads a serial number 0017 as 15, and 2026-11-20 as a date. `written` has the spelling by location.
     """
     if isinstance(data, dict):
         for name, field in model.model_fields.items():

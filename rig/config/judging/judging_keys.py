@@ -37,7 +37,7 @@ def _part_default_key(what: str) -> Any:
 
 
 class ObservationKeys(BaseModel):
-    """The requirements on a revolution to be averaged: the keys of the section `observation`."""
+    """The conditions under which a revolution is averaged: the keys of the section `observation`."""
 
     model_config = JUDGING_MODEL
 
@@ -60,7 +60,10 @@ class ObservationKeys(BaseModel):
 
 
 class UncertaintyKeys(BaseModel, Generic[OfSensors]):
-    """The stated sizes of errors: the keys of the section `uncertainty`; those of sensors have the type `OfSensors`."""
+    """The stated sizes of errors: the keys of the section `uncertainty`.
+
+    Sizes of a sensor's errors have the type `OfSensors`: one number in a configuration, one by sensor in a recording.
+    """
 
     model_config = JUDGING_MODEL
 
@@ -166,7 +169,7 @@ class UncertaintyKeys(BaseModel, Generic[OfSensors]):
 
 
 class ObservationSection(ObservationKeys, extra="forbid"):
-    """The requirements on a revolution to be averaged."""
+    """The conditions under which a revolution is averaged."""
 
     _numbers = field_validator("*", mode="before")(classmethod(refuse_boolean_number))
 

@@ -1,4 +1,4 @@
-"""Attitudes by name: angles of the wrists 1, 2, 3 in degrees, with base, shoulder and elbow at home.
+"""Sets of attitudes: angles of wrists 1, 2, 3 in degrees, while base, shoulder and elbow are at their home angles.
 
 The attitudes are possible on every known arm except a UR3e, whose forearm is too short. Wrist 2 remains at -90°, where
 the flange keeps its distance from the forearm, and wrists 1 and 3 reach every attitude.

@@ -12,7 +12,7 @@ SELF_STAMPED_PARTS = ("lines", "mavlink")  # with a port of their own, whose dev
 
 
 class HandSection(TurnerSection):
-    """An operator's hand, on a table: nothing is connected to, and nothing moves by itself."""
+    """An operator's hand, which turns the item on a table. The program connects to no turner and moves nothing."""
 
 
 class ByHandSection(ProcedureSection):
@@ -55,7 +55,7 @@ class ByHandSection(ProcedureSection):
     )
 
     def problems(self, config: RigConfig) -> Iterator[str]:
-        """Yield the problems of sensors: an unsuitable part, an unknown clock, a data rate too low for a hand."""
+        """Yield the sensors that do not suit: by their part, an unknown clock, or a data rate too low for a hand."""
         others = [name for name, sensor in config.sensors.items() if not sensor.on_board]
         if others and "crystal_ppm" not in config.uncertainty.model_fields_set:
             yield (

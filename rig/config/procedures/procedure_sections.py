@@ -203,9 +203,10 @@ class SixObservationSection(SixSweepsSection):
         return self.stages
 
     def problems(self, config: RigConfig) -> Iterator[str]:
-        """Yield the problems of sweeps, and of a target, a verification or magnetometers, which stages exclude.
+        """Yield the problems of sweeps, then each setting that stages exclude: a target, a verification, magnetometers.
 
-        With stages or arcs a magnetometer could be recorded but not calibrated, and only the run's end would show this.
+        Arcs exclude magnetometers too: with stages or arcs a magnetometer could be recorded but not calibrated, and
+        only the run's end would show this.
         """
         yield from SixSweepsSection.problems(self, config)
         if self.stages and (self.target_scale_u or self.target_bias_u_rad_s):

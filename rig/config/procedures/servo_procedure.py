@@ -43,7 +43,7 @@ THREE_MOUNTINGS = (
 
 
 class ServoSixObservationSection(ProcedureSection):
-    """Three mountings, in each a turn of the shaft in either direction: the speeds alone determine scale and bias."""
+    """Three mountings; in each, the shaft turns once in either direction. The speeds determine scale and bias."""
 
     name: Literal["servo_six_observation"] = Field(default="servo_six_observation", description="this procedure")
     stages: tuple[ServoStageSection, ...] = Field(

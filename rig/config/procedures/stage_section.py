@@ -46,15 +46,15 @@ class StageSection(Section):
 def mount_matrix(mount: StageMountSection) -> np.ndarray:
     """Return the rotation (3, 3) from the flange's frame to the item's: row i is the item's axis i.
 
-    The stated axes place the item, then the rotation vector rotates it, so components transform by the inverse of that
-    rotation.
+    `mount` states the axes of the item, then a further rotation of the item by `rotation_deg`. Rotating the item by R
+    transforms the components of a fixed vector by Rᵀ.
     """
     matrix: np.ndarray = rotation_by(np.radians(mount.rotation_deg)).T @ mounting_matrix(mount)
     return matrix
 
 
 def rotation_by(vector_rad: np.ndarray) -> np.ndarray:
-    """Return the (3, 3) rotation by a rotation vector (3,) in rad, by Rodrigues' formula."""
+    """Return the matrix (3, 3) that rotates a vector by the rotation vector (3,) in rad: Rodrigues' formula."""
     angle = float(np.linalg.norm(vector_rad))
     x, y, z = vector_rad
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

@@ -91,7 +91,7 @@ class LineFieldSection(Section):
 
 
 class LineTemperatureSection(Section):
-    """The column `temperature`, °C: printed value × scale + offset; without one, `stated_c`."""
+    """The column `temperature`: printed value × scale + offset is in °C. Without the column, `stated_c` applies."""
 
     scale: Scale = 1.0
     offset_c: float = Field(default=0.0, description="temperature at a printed 0")

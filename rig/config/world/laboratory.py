@@ -324,7 +324,7 @@ Flicker = Annotated[float, Field(ge=0, le=0.1, description="flicker of the bias:
 
 
 class SimulatedAccelerometerSection(Section):
-    """The truth of one accelerometer: a = F (s + φ s²) + b, s the specific force, at the gyroscope's temperature."""
+    """The truth of one accelerometer at the gyroscope's temperature: specific force s gives a = F (s + φ s²) + b."""
 
     scale: RowLengths = (1.0, 1.0, 1.0)
     bias_m_s2: Vector3 = Field(default=NO_ROW, description="bias b of each axis, part of the reading")

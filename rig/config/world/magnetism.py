@@ -10,7 +10,7 @@ NO_FIELD: Vector3 = (0.0, 0.0, 0.0)
 
 
 class IronSection(Section):
-    """Iron, a motor or a brake of the arm as a magnetic dipole, under a name of your choice."""
+    """A magnetic dipole that stands for iron, a motor or a brake of the arm, under a name of your choice."""
 
     carried_by: Literal["base", "shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3"] = Field(
         description="the link it is fixed to and moves with, by the joint that carries that; the housing of joint "
