@@ -34,9 +34,9 @@ def latest_run() -> Path:
 
 
 def meant_run(path: str | Path) -> Path:
-    """Return the path that a user names. A first part `latest` is the latest run's folder, unless such a file exists.
+    """Return the path that a user names; `latest` as its first part stands for the folder of the user's latest run.
 
-    Raise as `latest_run` does.
+    If a file `latest` exists, this file is meant. Raise as `latest_run` does.
     """
     first, *rest = Path(path).parts or (".",)
     return latest_run().joinpath(*rest) if first == LATEST and not Path(LATEST).exists() else Path(path)

@@ -13,9 +13,9 @@ JUDGED_PARAMETERS: tuple[Parameter, Parameter] = ("scale", "bias")
 class Meaning:
     """The subject of a check: conformity of a property of the item, or fitness of the measurement for use.
 
-    `sensor`, `quantity` and `parameter` are None if the check is about several of them or none. `sweep` is the
-    plan's index of a sweep that contradicts the others and that `rig resume` repeats. `what` names the criterion, such
-    as `scale_std`.
+    `sensor`, `quantity` and `parameter` are None if the check is about several of them or none. `sweep` is the index,
+    in the plan, of a sweep that contradicts the others; `rig resume` repeats it. `what` names the criterion, such as
+    `scale_std`.
     """
 
     kind: Kind

@@ -45,8 +45,8 @@ class Quantity:
     - reading: the unit of a reading on a screen; bias: the unit of a bias, and its least number of decimals; drift: the
       unit of a bias' change over hours; residuals: the units of residuals in a figure, the largest first.
     - walk: the name of its white noise; walk_suffix: the SI unit of that noise in names; walk_unit: the displayed unit.
-    - steady: largest difference, beyond noise, between the means of two adjacent seconds at rest. No bias changes as
-      fast, but a hand causes more, as does a tilt by half a degree. A field at a fixed position changes by a tenth.
+    - steady: the largest difference, apart from noise, that the means of two adjacent seconds at rest may have. No bias
+      changes as fast; a hand, or a tilt by half a degree, causes more. The magnetic field itself causes a tenth of it.
     - d_si: the unit as a digital certificate writes it. towards: the direction to which a sensor at rest is turned.
     - mistaken: the unit in which readings are given by mistake.
     - offset: the ratio of the reading at zero to the bias: −1 if the bias is a correction, m = g/k − b.

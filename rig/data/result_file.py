@@ -62,7 +62,7 @@ class CheckEntry(Entry):
     """One check of the verdict; `value` is null if nothing was measured, `limit` if none was set.
 
     - uncertainty, coverage_factor: U of the value and its k, if any; guard_band: distance from the limit that the
-      decision rule requires; false_acceptance_probability: that the true value is beyond the limit.
+      decision rule requires; false_acceptance_probability: probability that an accepted value is beyond the limit.
     - kind: conformity of a property of the item, or fitness of the measurement for use; sensor, quantity, parameter:
       the subject, if a single one; sweep: a sweep that contradicts the others; criterion: the name of the judged
       quantity, null if the check's package does not state it.
@@ -218,7 +218,7 @@ class VectorEntry(Entry):
 
 
 class NonlinearityEntry(Entry):
-    """Nonlinearity of each axis: reading = (g + odd |g| g + even g²) / scale − bias, g the rate along it in rad/s."""
+    """Nonlinearity of each axis: a rate g along it, in rad/s, gives (g + odd |g| g + even g²) / scale − bias."""
 
     odd_per_rad_s: Vector3
     odd_std_per_rad_s: Vector3
@@ -284,7 +284,11 @@ class BoardSolutionEntry(Entry):
 
 
 class BoardEntry(Entry):
-    """The board's solutions by method, and the difference of the closed form from that in double precision."""
+    """The board's own solutions, by method, and the host's solution, computed in double precision for comparison.
+
+    `scale_difference` and `bias_difference_rad_s` are the largest differences, on any axis, between the host's solution
+    and the board's solution in closed form.
+    """
 
     solutions: dict[str, BoardSolutionEntry]
     not_observed: tuple[str, ...]
@@ -372,9 +376,10 @@ class DeviationEntry(Entry):
 
 
 class RevolutionErrorEntry(Entry):
-    """Mean reading minus mean reference, over one revolution or over an arc of `angle_rad`.
+    """The error of one revolution or arc: mean reading minus mean reference.
 
-    `gravity_rad_s` is the part of it due to gravity and centripetal acceleration, if known.
+    `angle_rad` is the angle turned. `gravity_rad_s` is the part of the error that gravity and the centripetal
+    acceleration cause; null if no calibration determines it.
     """
 
     sweep: int
@@ -387,7 +392,11 @@ class RevolutionErrorEntry(Entry):
 
 
 class ComparisonEntry(Entry):
-    """A sensor's readings compared with the reference's; `noise_rad_s`: null without rests; one delay per recording."""
+    """A sensor's readings compared with the reference's, over all movements, over sweeps, and by revolution.
+
+    `noise_rad_s` is the standard deviation of their difference at rest, null without rests. `delay_s` is the delay of
+    the sensor behind the reference in each recording.
+    """
 
     movement: DeviationEntry
     sweeps: DeviationEntry
@@ -404,7 +413,10 @@ class ComparisonEntry(Entry):
 
 
 class VerificationEntry(Entry):
-    """A sensor against its reference, in the sensor's frame; `before` is null if only calibrated readings exist."""
+    """A sensor compared with its reference, in the sensor's frame, before and after calibration.
+
+    `before` is null if only calibrated readings were recorded.
+    """
 
     reference: str
     reference_scale: Vector3

@@ -73,8 +73,8 @@ class AccelerometerEntry(Entry):
       g, and the bias is the reading at 0 g.
     - reference_m_s2: specific force at rest in the arm's base frame; attitude_error_rad: error of the arm's attitudes
       about each axis, estimated from the readings.
-    - lever_arm_m, from the sweeps' axes to the sensor in the flange's frame, and delay_s, its lag behind the gyroscope:
-      only with sweeps.
+    - lever_arm_m: from the axis of the sweeps to the sensor, in the flange's frame; delay_s: the sensor's lag behind
+      the gyroscope; both are null without sweeps.
     - detection_limits: faults during the recording, and the sizes from which they are detected.
     - conditions: times and temperature (temperature_c) of the readings for scale and bias.
     - …_degrees_of_freedom: degrees of freedom of the standard deviations of that name, null if infinite.

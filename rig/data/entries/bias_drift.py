@@ -11,7 +11,10 @@ class BiasEntry(Entry):
 
 
 class BiasStepEntry(Entry):
-    """A step of the bias before `repeat`, counted from 1: its largest `change`, the `std`, and the `axis` of both."""
+    """An abrupt `change` of the bias just before `repeat` (counted from 1), and the change's standard deviations.
+
+    `axis` is the axis whose change is the most significant.
+    """
 
     repeat: int
     axis: str
@@ -46,7 +49,7 @@ class DriftEntry(Entry):
 
     - unit: the unit of all values whose names state none.
     - repeats: bias and temperature of each repeat.
-    - common_std: standard deviation that all biases share.
+    - common_std: standard deviation of the error that the biases of all repeats have in common.
     - scatter_ratio: scatter of the readings from repeat to repeat over that within a dwell.
     - steps: jumps of the bias.
     - false_alarm_probability: probability that a steady bias shows steps.

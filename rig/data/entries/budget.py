@@ -72,7 +72,7 @@ class BiasProcessEntry(Entry):
 
 
 class ClockComparisonEntry(Entry):
-    """The controller's clock against another."""
+    """The error of the controller's clock by comparison with one other `clock`."""
 
     clock: str
     error: float

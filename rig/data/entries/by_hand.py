@@ -29,7 +29,7 @@ class MoveByHandEntry(Entry):
 
 
 class HandErrorEntry(Entry):
-    """The estimated size of an error of a hand or a part, the stated one, and the limit."""
+    """The size of one error of the hand or of the part: as estimated and as stated, and the limit of the estimate."""
 
     name: str
     estimate: float

@@ -4,7 +4,7 @@ from rig.data.entries.result_types import Covariance, Entry, ErrorEntry, Positiv
 
 
 class OmittedIncrementsEntry(Entry):
-    """Increments that could not be made: the `error`, their number, and the start of the first one."""
+    """Increments of angle that could not be computed: the `error`, their number, and the start of the first one."""
 
     error: str
     count: int
@@ -12,7 +12,7 @@ class OmittedIncrementsEntry(Entry):
 
 
 class RateSolutionEntry(Entry):
-    """The solution of another method, g = K (m + b)."""
+    """The solution of a method that was not chosen, in the model g = K (m + b)."""
 
     scale: PositiveVector3
     bias_rad_s: Vector3
@@ -21,13 +21,14 @@ class RateSolutionEntry(Entry):
 
 
 class IncrementsEntry(Entry):
-    """Estimates in addition to scale and bias, of a gyroscope integrated from attitude to attitude.
+    """Estimates, other than scale and bias, of a gyroscope whose readings were integrated from attitude to attitude.
 
-    - window_s: length of the windows over which attitudes were averaged; attitude_std_rad: error of a mean about each
-      axis; clock_offset_s: corrected offset of the attitudes' clock from the readings'.
+    - window_s: length of the windows over which attitudes were averaged; attitude_std_rad: standard deviation of a mean
+      attitude about each axis.
+    - clock_offset_s: offset of the attitudes' clock from the readings' clock, which was corrected.
     - angle_random_walk_rad_sqrt_s: of the gyroscope's noise; matrix_scatter, bias_scatter_rad_s: scatter of F and b
       between intervals of the recording.
-    - omitted: increments that could not be made; rejected: number of increments left out as outliers.
+    - omitted: increments that could not be computed; rejected: number of increments left out as outliers.
     """
 
     increments: int
@@ -59,10 +60,10 @@ class AnglesEntry(Entry):
 class AttitudesEntry(Entry):
     """Results from attitudes in addition to a gyroscope's scale and bias.
 
-    - `earth_rate_rad_s`: in the axes of the table, with standard deviations, or `earth_rate_error`: why it is missing.
+    - `earth_rate_rad_s`: the Earth's rate in the axes of the table; `earth_rate_error`: why it is missing, if it is.
     - `by_increments`: results from increments of angle between attitudes, null if the rates were exact.
-    - `other_methods`: the solutions of the other methods.
-    - `covariance`: of F row by row, the Earth's rate and c of m = F ω + c.
+    - `other_methods`: the solutions of the methods that were not chosen.
+    - `covariance`: that of the model m = F ω + c: of F row by row, of the Earth's rate, and of c.
     """
 
     earth_rate_rad_s: Vector3 | None

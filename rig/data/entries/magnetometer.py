@@ -80,7 +80,8 @@ class FieldDriftEntry(Entry):
 class MagnetometerEntry(Entry):
     """A calibration m = F B + b of the magnetic field B in the axes of the nominal mounting.
 
-    - Iron and currents that turn with the magnetometer are part of F and b; hard_iron_t is F⁻¹ b. There are no limits.
+    - Iron and currents that turn with the magnetometer are part of F and b, so no limits judge them; hard_iron_t is
+      F⁻¹ b.
     - arm_field_in_bias: whether the bias contains the arm's own field that turns with the flange, which no residual
       shows; a run with the sensor turned over separates the two (`rig reversal`).
     - extension_m: its position on the flange; uniformity: test that the field was the same in all attitudes; drift:

@@ -64,10 +64,11 @@ class ConditionsEntry(Entry):
 
 
 class PlacementEntry(Entry):
-    """The placements of a body in attitudes that a file gives, in the unit of the readings.
+    """The repeatability of a body's placements in the attitudes that a file gives, in the unit of the readings.
 
-    - `placement_std`: standard deviation of a reading from placement to placement, not due to attitude errors; null if
-      the method does not estimate it. `rests_without_attitude` further rests contributed to it.
+    - `placement_std`: standard deviation of the readings from placement to placement that attitude errors do not
+      explain; null if the method does not estimate it.
+    - `rests_without_attitude`: number of rests in unknown attitudes that contributed to it.
     - `rows_omitted`: number of rows left out because the body moved.
     - `covariance`: of all estimates, in `covariance_order`.
     """
@@ -96,9 +97,11 @@ class DetectionLimitEntry(Entry):
 
 
 class OmittedEntry(Entry):
-    """Parts left out of a recording: `count` of `total` `what` (rows, increments, readings), and where the `first` is.
+    """Parts that the solution leaves out of a recording, and the reason.
 
-    The `reason` may begin with an error's name. `quantity` is the quantity that lacks them, null for all quantities.
+    `what` names the parts, such as rows or increments: `count` of `total` are left out. `first` is the position of the
+    first one. The `reason` may begin with an error's name. `quantity` is the only quantity that is solved without them,
+    null if all are.
     """
 
     quantity: str | None

@@ -21,7 +21,8 @@ HDF5_PLUGINS = {"HDF5_PLUGIN_PRELOAD": "::"}  # no plugins: a foreign file must 
 def can_fork() -> bool:
     """Return whether a reading process may be forked from this one.
 
-    HDF5 looks for plugins when it is loaded, so in this process nothing but `load_hdf5` may have loaded HDF5.
+    A forked process inherits HDF5 with the plugins that were named when it was loaded, and a foreign file must use none
+    of them. So nothing but `load_hdf5` may have loaded HDF5 in this process.
     """
     if sys.platform != "linux" or not hasattr(os, "pidfd_open") or ("h5py" in sys.modules and not load_hdf5()):
         return False

@@ -16,11 +16,11 @@ _Times = dict[str, tuple[float, float]]  # by thread: seconds on a processor, se
 class Silence:
     """A counter of the ticks without a sign of life from the process `pid`.
 
-    Ticks are counted, not seconds, because the counting process may itself be delayed. A tick is ignored if the thread
-    that is expected to answer (`thread`, any if None) mostly waited for a processor, unless the process was stopped.
-    Linux shows this (proc(5)); on other systems no tick is ignored. On a busy machine the limit of a silence grows by
-    at most LARGEST_LOAD_FACTOR, because the arm must not be left alone. Ignored ticks extend the limit further, by at
-    most the factor `spared`.
+    A tick is one interval between two looks at the process. Ticks are counted, not seconds, because the counting
+    process may itself be delayed. A tick is ignored if the thread that is expected to answer (`thread`, any if None)
+    mostly waited for a processor, unless the process was stopped. Linux shows this (proc(5)); on other systems no tick
+    is ignored. On a busy machine the limit of a silence grows by at most LARGEST_LOAD_FACTOR, because the arm must not
+    be left alone. Ignored ticks extend the limit further, by at most the factor `spared`.
     """
 
     def __init__(self, pid: int, *, spared: int, thread: int | None = None) -> None:
@@ -40,7 +40,7 @@ class Silence:
     def tick(self, unheard: bool = False) -> None:
         """Count one more interval without a sign of life.
 
-        Call this at even intervals. `unheard`: whether an unread answer waits, so that the process was not silent.
+        Call this at even intervals. With `unheard`, an answer has arrived but is unread, and the tick is ignored.
         """
         self._all_ticks += 1
         # The first tick of a silence means nothing yet; after the second, the process' threads are examined.
@@ -48,7 +48,7 @@ class Silence:
         self.ticks += not (starved or unheard)
 
     def lasts_over(self, limit: float) -> bool:
-        """Return whether the silence lasted more than `limit` ticks in which the process could have run.
+        """Return whether more than `limit` ticks were counted, or more than `limit` × `spared` with the ignored ones.
 
         So that the wait ends in any case, `spared` times as many ticks of any kind suffice. The `limit` is that of a
         machine with a processor for every program; it is multiplied by the machine's load.
@@ -65,7 +65,7 @@ class Silence:
     def _is_starved(self, has_previous: bool) -> bool:
         """Return whether the process waited for a processor since the last call; False at the first call.
 
-        The system counts a wait only when it has ended, so a ready thread that has not run is taken for a waiting one.
+        The system counts a wait only when it has ended, so a thread that is ready and has not run counts as waiting.
         """
         now_s = time.monotonic()
         elapsed_s, before = now_s - self._looked_s, self._times

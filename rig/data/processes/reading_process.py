@@ -52,7 +52,8 @@ class ReadingLimits:
     """The resources of a process that reads a file.
 
     - `memory_bytes`: address space.
-    - `processor_s`: time on a processor; `idle_s`: all time except waits for a processor or the disk.
+    - `processor_s`: time on a processor.
+    - `idle_s`: time without an end, in which waits for a processor or for the disk do not count.
     - `written_bytes`: the size of each file that it writes, for its results and for unpacking.
     """
 
@@ -82,7 +83,7 @@ def limits_for(stored_bytes: int) -> ReadingLimits:
 
 
 def stored_bytes(path: Path) -> int:
-    """Return the size on the disk of a regular file, or of the files side by side in a folder.
+    """Return the size on the disk of a regular file, or of all files directly in a folder.
 
     Raise `UnfitFile` for a pipe, a device, a socket, a file that is mostly holes, and a folder of too many files;
     OSError as `open` does.
@@ -200,9 +201,9 @@ def _fork(
 
 
 def read_apart(reader: str, path: Path, arguments: Mapping[str, Any], limits: ReadingLimits) -> list[Part]:
-    """Run a `reader` on a file in a process of its own, within `limits`, and return the parts that it yields.
+    """Return the parts that a `reader` ("module:function") yields of a file, in a process of its own with `limits`.
 
-    See `ReadingTask` for the arguments. Raise as `ReadingTask.parts` does.
+    Raise as `ReadingTask.parts` does.
     """
     with ReadingTask(reader, path, arguments, limits) as reading:
         return reading.parts()

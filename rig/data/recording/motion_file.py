@@ -27,10 +27,10 @@ QUATERNION = ("qw", "qx", "qy", "qz")
 
 @dataclass(frozen=True, slots=True)
 class Header:
-    """The columns of a file: all `needed` ones, exactly one of `one_of`, and groups of optional ones.
+    """The columns that a file may have: all `needed` ones, exactly one of `one_of`, and groups of `optional` ones.
 
-    `one_row`: whether the file has exactly one row. `between`: for each bounded column, the number that its values must
-    exceed, and the largest value allowed.
+    A file has either all columns of a group or none. `one_row`: whether the file must have exactly one row. `between`:
+    for each bounded column, the number that its values must exceed, and the largest value allowed.
     """
 
     needed: tuple[str, ...]
@@ -121,10 +121,10 @@ class Item:
 class ExternalReadings:
     """The `readings` (n,) of an item, and the rows (N,) of its `motion`, both by column.
 
-    `tells` is the kind of the motion: sweeps or attitudes, or "turns" by hand, which the readings show and one row of
-    the user's declarations describes. Times are relative to `origin_s` of the files' clock. `other_rows` is the number
-    of rows with readings of other sensors only. `note` states what the file's format does not specify about its
-    readings, "" if nothing.
+    `tells` is the kind of the motion: sweeps, attitudes or "turns". Turns by hand are detected in the readings
+    themselves; their `motion` is one row, in which the user declares what was done. Times are relative to `origin_s` of
+    the files' clock. `other_rows` is the number of rows with readings of other sensors only. `note` states what the
+    file's format does not specify about its readings, "" if nothing.
     """
 
     item: Item
@@ -166,7 +166,7 @@ class ExternalReadings:
 
 @dataclass(frozen=True, slots=True)
 class ExternalHeader:
-    """The description of external readings in a run file, without their tables: see `ExternalReadings`."""
+    """The fields of `ExternalReadings` that a run file holds as JSON: all but the tables of readings and motion."""
 
     item: Item
     tells: MotionKind

@@ -86,7 +86,7 @@ class BoardNotObserved:
 
 @dataclass(frozen=True, slots=True)
 class BoardRecalled:
-    """The board's average of a sweep, which was returned to the board after the run was interrupted."""
+    """The return of a sweep's average to the board that had computed it, when an interrupted run continues."""
 
     sensor: str
     sweep: int

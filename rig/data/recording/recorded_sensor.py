@@ -31,7 +31,7 @@ ALIGNED_MOUNTING: Mounting = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 class RecordedSensor:
     """A sensor and its `channels`, in the order of their columns in its samples.
 
-    - `mounting` (3 rows of 3): nominal rotation from flange to sensor frame, by default for a sensor without axes.
+    - `mounting` (3 rows of 3): nominal rotation from flange to sensor frame; the identity for a sensor without axes.
     - `mode`: "calibrated" if the rates were corrected before they were recorded.
     - `clock`: the sensor whose clock stamps the samples, itself or its device; None for the board.
     - `stamp_std_s`: standard uncertainty of a time stamp, None if negligible.
@@ -63,7 +63,10 @@ class RecordedSensor:
 
     @property
     def unseen_change_k(self) -> float:
-        """The change of temperature, K, that may be unrecorded: a step of the thermometer, or an assumed change."""
+        """The change of temperature, K, that a recording may not show.
+
+        It is the step of the thermometer, the possible change of a stated temperature, or an assumed change.
+        """
         return self.channel(TEMPERATURE).resolution if self.measures(TEMPERATURE) else UNKNOWN_CHANGE_K
 
     @property

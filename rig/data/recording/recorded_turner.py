@@ -30,7 +30,7 @@ class RecordedTurner:
     - `joints`: the names of its joints, at most `MAX_JOINTS`, beginning at the ground.
     - `geometry`: the geometry of the chain of joints.
     - `fields`: the fields of its states other than times and joints.
-    - `reading_std_rad`: the same as in `TurnerIdentity`.
+    - `reading_std_rad`: the standard deviation of one reading of a joint's angle, 0 if negligible.
     """
 
     kind: Kind

@@ -39,5 +39,8 @@ class RunData:
         return {name: sensor for name, sensor in self.sensors.items() if sensor.measures(quantity)}
 
     def override_settings(self, overrides: Sequence[str]) -> "RunData":
-        """Return the recording under other settings: see `RunSettings.apply_overrides`."""
+        """Return the recording with some of its settings replaced by `overrides`, such as `limits.scale_std=0.001`.
+
+        Raise as `RunSettings.apply_overrides` does.
+        """
         return replace(self, settings=self.settings.apply_overrides(overrides)) if overrides else self

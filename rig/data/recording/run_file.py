@@ -136,10 +136,10 @@ class RunRecorder:
             self._abandon()
 
     def _abandon(self) -> None:
-        """Leave the file as after the last flush.
+        """Close the file in the state that the last complete flush left, after a write has failed.
 
-        HDF5 repeats a failed write whenever anything is closed, and ends the process with a segmentation fault at exit;
-        from here on all writes are discarded.
+        HDF5 would repeat the failed write whenever anything is closed, and crash the process at exit. So all its
+        further writes are discarded.
         """
         with Path(os.devnull).open("r+b") as nothing:
             os.dup2(nothing.fileno(), self._descriptor)
@@ -170,10 +170,10 @@ class RunRecorder:
 def read_run(path: Path, timeout_s: float | None = None, *, begun: ReadingTask | None = None) -> RunData:
     """Return the content of a run file: finished, still being written, or left behind by a killed process.
 
-    `begun` is the result of `begin_reading`, if that was called before. Rows left unwritten or incomplete by a kill are
-    dropped. Raise Refused: `no_run_file` without a file; `not_a_run_file` if the file is damaged, of another kind or
-    schema, or takes longer than `timeout_s` (None: by its size) on a machine that is not overloaded;
-    `temporary_folder_full`.
+    `begun` is the result of `begin_reading`, if that was called before. Rows that a killed process did not write
+    completely are dropped. Reading may take `timeout_s`, by default a time that depends on the file's size; waits due
+    to a busy machine do not count. Raise Refused `no_run_file`; `not_a_run_file` for a damaged file, another kind or
+    schema of file, or one that takes longer; `temporary_folder_full`.
     """
     contents = _contents(path, timeout_s, begun)
     try:
@@ -232,7 +232,7 @@ def make_plain(path: Path) -> None:
 
 
 def _contents(path: Path, timeout_s: float | None, begun: ReadingTask | None = None) -> Contents:
-    """Return the file's contents, read in a process that can be ended: see `rig.data.recording.extract`."""
+    """Return the contents of a run file, read in a process of its own, which can be ended. Raise as `read_run` does."""
     try:
         with begun or begin_reading(path, timeout_s) as reading:
             header, *arrays = reading.parts()

@@ -47,9 +47,10 @@ def _measure_stored_bytes(path: Path) -> int:
 
 @contextmanager
 def reading_ahead(run: Path) -> Iterator[dict[Path, ReadingTask]]:
-    """Read the first recording of a run folder, or a run file, during the block; yield the reading by its path.
+    """Begin to read the first recording of a run folder, or a run file, and yield the running task by the file's path.
 
-    A folder without a recording yields nothing. Raise as `begin_reading` does.
+    The task ends with the block. For a folder without a recording, an empty mapping is yielded. Raise as
+    `begin_reading` does.
     """
     first = run / FIRST_RECORDING if run.is_dir() else run
     if first != run and not first.exists():

@@ -149,8 +149,10 @@ class SolveOptions:
 class HandSettings:
     """The settings of a session by hand, and its planned numbers of `flips` and whole `turns`.
 
-    The next move is requested `rest_s` after the item came to rest. `box_rad` and `closure_rad` are standard deviations
-    of the item's faces from right angles, and of a whole turn's end from its beginning.
+    - `rest_s`: the time from the item's coming to rest to the next request.
+    - `box_rad`: standard deviation of the angles between the item's faces from right angles.
+    - `closure_rad`: standard deviation of the angle between the beginning and the end of a whole turn.
+    - `wanted_scale_u`: the U of the scale factors at which the session may end early, None for no target.
     """
 
     flips: Annotated[int, Field(ge=0)]
