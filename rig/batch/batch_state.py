@@ -16,7 +16,7 @@ Folder = Annotated[str, Field(pattern=r"^\d{2,}-[A-Za-z0-9._-]*$")]  # a plain n
 
 @dataclass(frozen=True, slots=True)
 class Begun:
-    """The beginning of a batch: operator and work order (empty if not stated); `simulated`: the laboratory is."""
+    """The beginning of a batch: operator and work order, empty if not stated; whether the laboratory is simulated."""
 
     operator: str
     work_order: str
@@ -127,7 +127,7 @@ class Batch:
         return next((part for part in reversed(self.parts) if part.serial == serial and _has_verdict(part)), None)
 
     def same_chip(self, chip: Chip, serial: str) -> BatchPart | None:
-        """Return the part with this chip and a verdict whose serial number is not `serial`, or None."""
+        """Return the newest part that has this chip, a verdict, and another number than `serial`; None without one."""
         for part in reversed(self.parts):
             earlier = part.ended.chip if part.ended is not None and _has_verdict(part) else None
             if part.serial != serial and earlier is not None and earlier.is_that(chip):
@@ -174,7 +174,10 @@ class Doubt:
 
 
 def doubt_of(serial: str, batch: Batch, section: StationSection, today: Callable[[str], str | None]) -> Doubt | None:
-    """Return the objection to running this serial number now, or None; `today` describes its run today, if any."""
+    """Return the objection to running this serial number now, or None.
+
+    `today` describes the run that the number has already had today, if any.
+    """
     try:
         check_serial_number(serial)
     except ValueError as error:

@@ -125,7 +125,7 @@ class Work:
                     return self._end_part(PartEnded(outcome, now_utc(), f"{error.name}: {error.what}"))
 
     def refuse_same_chip(self, part: BatchPart, chip: Chip) -> None:
-        """Raise Refused `same_chip` if the chip had another serial number before, unless the operator goes on."""
+        """Raise Refused `same_chip` if the chip had another serial number before, unless the operator overrides it."""
         if not self.section.own_board:
             return
         other = self.journal.batch.same_chip(chip, part.serial)

@@ -79,7 +79,7 @@ def read_column_map(path: Path | None) -> "ColumnMap":
 
 
 def find_logs(path: Path) -> list[Path]:
-    """Return the paths of logs: the given log, or all in a folder of `rig record`; an empty list for a run."""
+    """Return the logs at a path: the file itself, or all in a folder of `rig record`; an empty list for a run."""
     from rig.observation.formats.sample_files import is_in_format, whole
 
     if is_in_format(path):
@@ -106,7 +106,7 @@ def add_history(parser: argparse._ActionsContainer) -> None:
 
 
 def read_history_name(name_or_file: str | None) -> str | None:
-    """Return a history's file or URL as named, or as configured in a named YAML file; None without a name.
+    """Return a history's file or URL: the name itself or, for a configuration's name, the URL in it; None without one.
 
     Raise Refused as `load` does.
     """

@@ -43,7 +43,7 @@ def hand_event_line(event: RunEvent) -> str | None:
 
 
 def live_rows(state: HandSeen) -> tuple[tuple[str, str], ...]:
-    """Return the present state of a session, by the names of its rows."""
+    """Return name and text of each row in which a panel shows the present state of a session."""
     peak, range_deg_s = degrees(state.peak_rad_s), degrees(state.range_rad_s)
     fast = "  TOO FAST" if range_deg_s and peak > RED_FRACTION * range_deg_s else ""
     of_range = f" of {range_deg_s:.0f}" if range_deg_s else ""
@@ -60,7 +60,7 @@ def live_rows(state: HandSeen) -> tuple[tuple[str, str], ...]:
 
 
 def open_moves_words(state: HandSeen) -> str:
-    """Return the number of open moves in words."""
+    """Return the numbers of moves that remain to be made, in words."""
     flips = f"{len(state.pairs)} moves from side to side" if len(state.pairs) != 1 else "1 move from side to side"
     turns = f", {len(state.turns)} whole turn{'' if len(state.turns) == 1 else 's'}" if state.turns else ""
     return flips + turns

@@ -128,9 +128,9 @@ class Progress:
 
 @dataclass(frozen=True, slots=True)
 class SensorSamples:
-    """The samples of one sensor so far: their number, lost ones by their numbering, newest mean readings by quantity.
+    """The samples of one sensor so far: numbers of received and `lost` ones, and the `latest` means by quantity.
 
-    A reading is a number for each axis, or a single one, in the quantity's unit (`rig.data.installed_kinds.measured`).
+    A mean reading is a number for each axis, or a single one, in the unit of the quantity.
     """
 
     sensor: str
@@ -177,7 +177,7 @@ class PhaseRecorded:
 
 @dataclass(frozen=True, slots=True)
 class HandSeen:
-    """The present movement of a hand, ten times a second, by the first sensor to calibrate.
+    """The present movement of a hand as the first sensor to calibrate measures it, ten times a second.
 
     - time_s: the board's time.
     - doing: "starting", "resting", "moving" or "held".
@@ -187,7 +187,7 @@ class HandSeen:
     - range_rad_s: the sensor's range.
     - expanded_scale: the largest U (k = 2) of the scale factors so far, None before a solution.
     - faces: the sides that have been up in a rest.
-    - pairs, turns: the remaining moves.
+    - pairs: the pairs of sides between which moves remain; turns: axis and direction of the whole turns that remain.
     - accepted: the number of accepted moves.
     """
 

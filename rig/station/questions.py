@@ -14,7 +14,7 @@ Kind = Literal["number", "mount", "go", "doubt", "again"]
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """An answer of a question: the `words` that may be typed, its `label` on a button, whether it means yes."""
+    """A possible answer to a question: the `words` that may be typed, its `label` on a button, whether it means yes."""
 
     words: tuple[str, ...]
     label: str

@@ -36,7 +36,7 @@ from rig.station.plain_text import say
 
 @dataclass(frozen=True, slots=True)
 class BoardSlot:
-    """A configured sensor on the board, with its stored calibration."""
+    """A configured sensor, its `index` on the board, and the calibration that the board has stored for it, if any."""
 
     name: str
     section: SensorSection

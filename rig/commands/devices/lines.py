@@ -46,7 +46,7 @@ def add_stated(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     """Print the section on stdout, or write the file; report on stderr what the lines show, and what is missing.
 
-    Return 0, or 1 if the file needs more values. Raise Refused as `look_at_device`, `ask_stated` and `write_checked`.
+    Return 0, or 1 if the file needs more values. Raise what `look_at_device`, `ask_stated` and `write_checked` raise.
     """
     if not all(0.5 <= duration_s <= 600 for duration_s in options.seconds):
         raise Refused("bad_option", "--seconds are two times from 0.5 to 600", "Give for example --seconds 4 6")

@@ -44,10 +44,10 @@ def run(options: Namespace) -> int:
 def export_files(options: Namespace) -> list[Path]:
     """Write readings and motion of a run's first movement, or a passed run's calibrations, into `--out`.
 
-    `--at-temperature` has a temperature, °C, and the run of `bias_drift` whose slopes move the biases to it. Return the
-    files. Raise Refused `report_folder`, `bad_option`, `missing_extra`, and what `refuse_links` raises; for readings
-    also what `open_run`, `read_log` and `export_recordings` raise; for calibrations what `read_passed_result`,
-    `at_temperature` and the format raise.
+    `--at-temperature` has a temperature, °C, and a run of `bias_drift`, by whose slopes the biases are converted to
+    this temperature. Return the files. Raise Refused `report_folder`, `bad_option`, `missing_extra`, and what
+    `refuse_links` raises; for readings also what `open_run`, `read_log` and `export_recordings` raise; for calibrations
+    what `read_passed_result`, `move_to_temperature` and the format raise.
     """
     from rig.report.exports.exported_recording import export_recordings
 
@@ -118,7 +118,10 @@ def _make_folder(folder: Path, *, named_by_user: bool) -> None:
 
 
 def _read_calibrations(run: Path, moved: tuple[str, str] | None) -> "ExportedCalibrations":
-    """Return the calibrations of a passed run, moved to another temperature by the slopes of a drift run if given."""
+    """Return the calibrations of a passed run, converted to another temperature if `moved` is given.
+
+    `moved` is this temperature, and the run whose temperature slopes are used.
+    """
     from rig.data.result_file import read_passed_result, read_result
     from rig.report.exports.exported_corrections import calibrations
     from rig.report.exports.temperature import move_to_temperature

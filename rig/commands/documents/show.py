@@ -66,7 +66,7 @@ def _list_sensors(result: "ResultDocument") -> list[str]:
 
 
 def _describe_scalars(run: Path) -> dict[str, str]:
-    """Return a text for each sensor with what it recorded apart from axes. Raise Refused as `read_run` does."""
+    """Return, by sensor, a text on the recorded quantities without axes. Raise Refused as `read_run` does."""
     import numpy as np
 
     from rig.data.recording.run_file import read_run

@@ -34,10 +34,10 @@ def recall_sensors(config: RigConfig, moved: frozenset[str]) -> Memory:
 def find_other_board(
     config: RigConfig, board: str, parts: Collection[str], own_serial_numbers: Collection[str], *, simulated: bool
 ) -> str | None:
-    """Return another serial number that the history has for a sensor on this board, with its date, in words.
+    """Return the serial number of the newest calibration on this `board`, with its date, if it is another sensor's.
 
-    Only the newest calibration of one of the `parts` counts. Return None if the history has no such calibration, if
-    its serial number is one of `own_serial_numbers`, or if the history does not answer.
+    Only calibrations of the `parts` count. Return None if there is none, if the serial number is one of
+    `own_serial_numbers`, or if the history does not answer.
     """
     from rig.history.storage.address import choose_history_address
 

@@ -22,8 +22,9 @@ MAX_CANDIDATES = 250
 def find_own_address(config: SensorsConfig, laboratory: str | None) -> Iterator[list[str]]:
     """Yield the overrides that give a configuration's laboratory an address of its own during the block.
 
-    `laboratory` is as in `Loaded`. There are no overrides if the address is free, the laboratory is real, or no
-    candidate is free; in the last case a later claim fails.
+    `laboratory` is the configuration's text if its laboratory is simulated, else None. There are no overrides if the
+    configured address is free, if the laboratory is real, or if no address is free. In the last case a later claim
+    fails.
     """
     if laboratory is None or not isinstance(config, RigConfig):
         yield []

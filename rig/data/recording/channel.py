@@ -26,7 +26,7 @@ MAX_CHANNELS: Final = 16
 class Channel:
     """One quantity of a sensor: reading = number in the `column` × `unit_per_count` + `offset`, in the quantity's unit.
 
-    - quantity: a name in `measured()`; type: the NumPy type of the numbers.
+    - quantity: a name in `channel_contents()`; type: the NumPy type of the numbers.
     - full_scale_counts: the number at which the sensor saturates; range: the nominal end of scale, in the quantity's
       unit; None if unknown.
     - step: largest distance of neighbouring readings, in the unit, if it is more than a count. Numbers truncated toward
