@@ -246,7 +246,7 @@ def _carry_out(name: str | None, command: Callable[[argparse.Namespace], int], o
 
 
 def run_guarded(command: Callable[[], int]) -> int:
-    """Run a command; turn every named error into one message on stderr and its exit status."""
+    """Run a command and return its exit status; print a named error as one message on stderr."""
     keep_streams_usable()
     end_by_interrupt()
     try:
@@ -286,7 +286,7 @@ def _print_ending(text: str, status: int) -> int:
 
 
 class _Parser(argparse.ArgumentParser):
-    """A parser whose error is one line before the usage, with the choices that may have been meant."""
+    """A parser that prints an error in one line before the usage, with the choice that may have been meant."""
 
     def error(self, message: str) -> NoReturn:
         """Print the error, the command's usage and how to get help; exit with status 2."""

@@ -174,10 +174,7 @@ class Doubt:
 
 
 def doubt_of(serial: str, batch: Batch, section: StationSection, today: Callable[[str], str | None]) -> Doubt | None:
-    """Return the objection to running this serial number now, or None.
-
-    `today` describes the run that the number has already had today, if any.
-    """
+    """Return the objection to running this serial number now, or None; `today` describes its earlier run today."""
     try:
         check_serial_number(serial)
     except ValueError as error:

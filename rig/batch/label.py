@@ -36,7 +36,7 @@ class Label:
 
 
 def files_of(label: Label) -> Mapping[str, bytes]:
-    """Return the label's files by the endings of their names. Raise Refused `missing_extra`."""
+    """Return the contents of the label's files, by file name extension. Raise Refused `missing_extra`."""
     return {".txt": text(label).encode(), ".zpl": zpl(label).encode(), ".svg": qr_svg(label.certificate)}
 
 

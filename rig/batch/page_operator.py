@@ -52,7 +52,7 @@ class PageOperator:
                 self._sections.put(asked=None)
 
     def takes(self, number: int, text: str) -> bool:
-        """Accept the answer to a question, given by its number; return False if that question is closed."""
+        """Accept `text` as the answer to the question with this number; return False if that question is closed."""
         with self._changed:
             if not self._open or number != self._number:
                 return False

@@ -63,8 +63,8 @@ def say_where_the_result_is(result: Path) -> None:
 def keep_streams_usable() -> None:
     """Make stdin, stdout and stderr usable in any state: closed, a pipe without a reader, a closed terminal.
 
-    Neither a lost stdout nor a lost stderr, which has only progress, ends the work. A full disk under stdout loses
-    results: see `output_lost`. A reader that has gone away (`rig plan … | head`) has read enough.
+    If one of them is lost, the work continues. stderr has only progress. If stdout is a file on a full disk, results
+    are lost, and `output_lost` returns why; a reader that has closed the pipe (`rig plan … | head`) has read enough.
     """
     # A closed descriptor would go to the next file opened, and stray output into that file.
     for descriptor, name in enumerate(("stdin", "stdout", "stderr")):

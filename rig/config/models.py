@@ -132,7 +132,7 @@ class ArmSection(TurnerSection):
         return self.host
 
     def override_host(self, host: str) -> Mapping[str, str]:
-        """Return the change of the section that sets the controller's host to `host`, as value by key."""
+        """Return the section's key of the controller's host, with the new value `host`."""
         return {"host": host}
 
     @property
@@ -238,10 +238,10 @@ class SensorsConfig(Section):
     @field_validator("sensors")
     @classmethod
     def match_sensors(cls, sensors: dict[str, SensorSection]) -> dict[str, SensorSection]:
-        """Refuse sensors that share a source or a name, an overloaded port, and other than one or no reference.
+        """Refuse sensors that share a source or a name, an overloaded port, and more than one reference.
 
-        The source of a sensor is its part on the board, its own port, or an IMU of an autopilot. At least one sensor
-        must be one to calibrate.
+        The source of a sensor is its part on the board, its own port, or an IMU of an autopilot. Also refuse sensors
+        of which none is to be calibrated.
         """
         sensor_at: dict[str, str] = {}
         for name, sensor in sensors.items():

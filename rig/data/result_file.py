@@ -218,7 +218,7 @@ class VectorEntry(Entry):
 
 
 class NonlinearityEntry(Entry):
-    """Nonlinearity of each axis: a rate g along it, in rad/s, gives (g + odd |g| g + even g²) / scale − bias."""
+    """Nonlinearity of each axis: a rate g along it, in rad/s, reads (g + odd |g| g + even g²) / scale − bias."""
 
     odd_per_rad_s: Vector3
     odd_std_per_rad_s: Vector3

@@ -27,7 +27,7 @@ def quote(value: Any) -> str:
 
 
 def list_first(names: Iterable[str]) -> str:
-    """Return the first of many names, which are already shortened, and the number of the others."""
+    """Return the first `MAX_NAMES` names in one text, and the number of the others; no name is shortened."""
     every = list(names)
     more = len(every) - MAX_NAMES
     return (", ".join(every[:MAX_NAMES]) + (f", and {more} more" if more > 0 else "")) or "none"

@@ -105,10 +105,7 @@ def change_entry(change: Change) -> dict[str, Any]:
 
 
 def rigs_document(states: Sequence[RigState], effects: Mapping[str, Sequence[RigEffect]]) -> dict[str, Any]:
-    """Return for JSON the control charts of each rig, and by parameter the `effects`: how results of rigs differ.
-
-    Effects on scale factors are fractions.
-    """
+    """Return, for JSON, the control charts of each rig and, by parameter, the differences between rigs (`effects`)."""
     return {
         "schema": SCHEMA,
         "rigs": [

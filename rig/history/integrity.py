@@ -26,10 +26,7 @@ MAX_SHOWN = 3  # of a run that are reported
 
 @dataclass(frozen=True, slots=True)
 class EntryState:
-    """The state of a file or of an entry, and the reason why it has this state.
-
-    `what` is the path of the file or the name and number of the entry.
-    """
+    """The state of a file or an entry, and its reason; `what` is the file's path, or the entry's name and number."""
 
     what: str
     state: State
@@ -139,10 +136,7 @@ def _unknown(folder: Path, entered: Mapping[str, set[tuple[str, str]]]) -> Itera
 
 
 def _names(run: KeptRun, folder: Path) -> set[str]:
-    """Return the names of the run's files to look for in this folder.
-
-    These are its documents and, only if they are present, its result and its certificates.
-    """
+    """Return the names of the run's documents and, if they are in the folder, of its result and certificates."""
     possible = {RESULT, *(name for certificate in run.certificates for name, _ in certificate.files)}
     return {name for name, _ in run.documents} | {name for name in possible if (folder / name).exists()}
 

@@ -70,7 +70,7 @@ class Trend:
 
     @property
     def std(self) -> Array:
-        """The standard deviations (n,) of the random part between runs."""
+        """The statistical standard uncertainties (n,) of the values, without errors that all runs have in common."""
         return np.array([parameter.std_statistical for parameter in self.parameters])
 
     @cached_property
@@ -163,7 +163,7 @@ def subjects(pasts: Iterable[Past]) -> dict[Subject, list[Past]]:
 
 
 def trends(pasts: Sequence[Past]) -> dict[str, Trend]:
-    """Return the trend of every parameter in the newest calibration of one subject."""
+    """Return the trend of every parameter that the newest of these calibrations has; all are of one subject."""
     by_name = {}
     for name in pasts[-1].parameters if pasts else ():
         having = [past for past in pasts if name in past.parameters]
@@ -200,10 +200,7 @@ def changes_between(before: Sequence[Past], now: Sequence[Past]) -> dict[Subject
 
 
 def rig_states(pasts: Sequence[Past]) -> list[RigState]:
-    """Return the state of every rig that calibrated a check standard.
-
-    A sensor is a check standard if the configuration of any of its runs declared it to be one.
-    """
+    """Return the state of every rig that calibrated a check standard, a sensor that any of its runs declares as one."""
     # Drifts and curves are not standards, and external readings have no rig.
     by_subject = subjects([past for past in pasts if past.quantity in quantities() and past.rig != NO_ARM])
     standards = {key: series for key, series in by_subject.items() if any(past.check_standard for past in series)}

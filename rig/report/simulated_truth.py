@@ -72,7 +72,7 @@ class TruthRow:
 
 
 def truth_rows(folder: Path, result: ResultDocument) -> list[TruthRow]:
-    """Return the rows of the simulated truth in a run folder; empty without a valid file."""
+    """Return the result's rows whose true values are in the run folder; empty without a valid file of the truth."""
     try:
         document = parse_json(read_regular_file(folder / TRUTH_FILE, SIZE_MAX_BYTES))
         truth = validate(_TruthFile, document, "truth")

@@ -15,7 +15,7 @@ from rig.station.words import line, reason
 
 
 class Log:
-    """The writer of an open log file. Errors of writing are ignored: the recording reports them."""
+    """The writer of an open log file. It ignores a full disk, which the recording in the same folder reports."""
 
     def __init__(self, file: TextIO) -> None:
         self._file = file

@@ -27,9 +27,10 @@ class Station(Protocol):
 
 @dataclass(slots=True)
 class Stations:
-    """A station of several listeners and one answer; if not `attended`, everything is agreed to in advance.
+    """A station that sends events to its listeners, and questions to `answer` if an operator attends.
 
-    `mount` mounts the item for a stage after agreement, in a simulated laboratory. `confirm` confirms a batch's part.
+    If not `attended`, everything is agreed to in advance. `mount` mounts the item for a stage in a simulated
+    laboratory, after agreement. `confirm` confirms the part of a batch.
     """
 
     listeners: Sequence[Listener]

@@ -118,10 +118,7 @@ def _make_folder(folder: Path, *, named_by_user: bool) -> None:
 
 
 def _read_calibrations(run: Path, moved: tuple[str, str] | None) -> "ExportedCalibrations":
-    """Return the calibrations of a passed run, converted to another temperature if `moved` is given.
-
-    `moved` is this temperature, and the run whose temperature slopes are used.
-    """
+    """Return the calibrations of a passed run, or those at another temperature: `moved` is it and the drift's run."""
     from rig.data.result_file import read_passed_result, read_result
     from rig.report.exports.exported_corrections import calibrations
     from rig.report.exports.temperature import move_to_temperature

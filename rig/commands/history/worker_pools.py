@@ -148,7 +148,7 @@ class Cluster:
         future.add_done_callback(self._done.put)
 
     def answers(self) -> Iterator[SolvedTask]:
-        """Wait a moment for an answer, and yield one that arrives."""
+        """Wait a moment for an answer, and yield it if one arrives."""
         try:
             future = self._done.get(timeout=POLL_S)
         except Empty:

@@ -20,7 +20,7 @@ def write_truth(
 ) -> Iterator[DocumentWritten]:
     """Have the laboratory at `control` write the truth over the windows of a run; yield the event of its file.
 
-    The laboratory writes the file `written`, named when it started; then this file is moved to the run's `folder`.
+    The laboratory writes to `written`, the path that it got at its start; then the file is moved to the run's `folder`.
     Nothing is written for a calibration over temperature, because its values belong to the reference temperature, not
     to the temperatures of the run.
     """

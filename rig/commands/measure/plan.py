@@ -63,7 +63,7 @@ def _print_by_hand(section: "ByHandSection", *, as_json: bool) -> None:
 
 
 def make_plan(options: Namespace) -> "DryRun":
-    """Return the plan from home. Raise Refused for a motion beyond a limit or attitudes that determine too little."""
+    """Return the plan, which begins at home. Raise Refused for a motion beyond a limit, or insufficient attitudes."""
     from rig.commands.configured import load_configured
     from rig.errors import refuse
     from rig.report.terminal.plan_table import DryRun

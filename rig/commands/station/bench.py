@@ -226,7 +226,7 @@ class RigBench:
 
 @contextmanager
 def open_bench(configured: Configured, folder: Path, station: BatchSettings) -> Iterator[RigBench]:
-    """Yield the bench, which is open during the block; `folder` is the batch's.
+    """Yield the bench of the batch in `folder`, which is open during the block.
 
     Raise Refused `station_sensors` if the configuration has no sensors that a station can calibrate, and what
     `claim_devices` raises.

@@ -46,7 +46,7 @@ def read_layers(path: Path, overrides: Sequence[str] = ()) -> MergedLayers:
 
 
 def merge_layers(text: str, path: Path | None, overrides: Sequence[str] = ()) -> MergedLayers:
-    """Return a text merged with its base files, relative to its `path`, and with overrides. Raise `Unreadable`."""
+    """Return a text merged with its base files, named relative to `path`, and with overrides. Raise `Unreadable`."""
     layers = list(_layers(text, path))
     document: dict[str, Any] = {}
     places: dict[Location, str] = {}

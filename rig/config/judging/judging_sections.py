@@ -15,7 +15,7 @@ MIN_LEVEL_SINE = 0.1
 
 
 class SiteSection(Section):
-    """The site of the arm. With latitude and heading the Earth's rate is removed. The texts are for certificates."""
+    """The site of the arm. If it has latitude and heading, the Earth's rate is removed. Texts are for certificates."""
 
     laboratory: Words | None = Field(default=None, description="the laboratory's name, for certificates")
     address: Words | None = Field(default=None, description="the laboratory's address, in one line")

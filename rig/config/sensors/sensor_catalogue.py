@@ -83,7 +83,7 @@ class PartSpec:
         return self.acceleration_noise_ug_sqrt_hz / sqrt(2)
 
     def accept_rate(self, rate_hz: float) -> float:
-        """Return the part's exact rate for a nominal `rate_hz`. Raise ValueError, with the nearest, if no rate fits."""
+        """Return the part's exact rate for a nominal `rate_hz`. Raise ValueError naming the nearest if no rate fits."""
         if self.any_rate:
             return positive(rate_hz)
         return nearest_rate(rate_hz, self.rates_hz, self.rates_rule)
@@ -102,7 +102,7 @@ class MagnetometerPart:
     default_rate_hz: float
 
     def accept_rate(self, rate_hz: float) -> float:
-        """Return the part's exact rate for a nominal `rate_hz`. Raise ValueError, with the nearest, if no rate fits."""
+        """Return the part's exact rate for a nominal `rate_hz`. Raise ValueError naming the nearest if no rate fits."""
         return nearest_rate(rate_hz, self.rates_hz, list_numbers(self.rates_hz))
 
     def accept_range(self, range_gauss: float) -> float:
@@ -111,7 +111,7 @@ class MagnetometerPart:
 
 
 def nearest_rate(rate_hz: float, rates_hz: Sequence[float], rule: str) -> float:
-    """Return the exact rate for a nominal `rate_hz`. Raise ValueError, with the nearest rate, if none matches."""
+    """Return the exact rate for a nominal `rate_hz`. Raise ValueError naming the nearest rate if none matches."""
     nearest = min(rates_hz, key=lambda rate: abs(rate - rate_hz))
     if abs(nearest - rate_hz) > RATE_TOLERANCE * nearest:
         raise ValueError(f"not available; the nearest is {nearest:.6g}; allowed: {rule}")

@@ -23,9 +23,10 @@ class BiasStepEntry(Entry):
 
 
 class RepeatEntry(Entry):
-    """One repeat of all attitudes: its bias with scale, axes and reference fixed, and with all of them estimated.
+    """One repeat of all attitudes, and the bias in it.
 
-    `time_s` is the time from the middle of the first repeat to the middle of this repeat.
+    `scale_fixed` is the bias estimated with scale, axes and reference fixed, `scale_free` together with them. `time_s`
+    is the time from the middle of the first repeat to the middle of this repeat.
     """
 
     time_s: float
@@ -50,7 +51,7 @@ class DriftEntry(Entry):
     - unit: the unit of all values whose names state none.
     - repeats: bias and temperature of each repeat.
     - common_std: standard deviation of the error that the biases of all repeats have in common.
-    - scatter_ratio: scatter of the readings from repeat to repeat over that within a dwell.
+    - scatter_ratio: ratio of the readings' scatter from repeat to repeat to that within a dwell.
     - steps: jumps of the bias.
     - false_alarm_probability: probability that a steady bias shows steps.
     - largest_change: the largest change between any two repeats.

@@ -80,7 +80,10 @@ class ClockComparisonEntry(Entry):
 
 
 class ClockEntry(Entry):
-    """The relative rate error of the controller's clock, for which speeds are corrected, and its comparisons."""
+    """The relative frequency error of the controller's clock, and its comparisons with other clocks.
+
+    Speeds are corrected for this error.
+    """
 
     error: float
     std: float

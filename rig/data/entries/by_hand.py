@@ -16,9 +16,10 @@ class RestByHandEntry(Entry):
 
 
 class MoveByHandEntry(Entry):
-    """A move from one rest to the next, by `angle_rad`: a flip to another face, or whole `turns` on a face.
+    """A move from one rest to the next: a flip to another face, or whole `turns` on a face.
 
-    `closure_error_rad` is a turn's end minus its start; null for flips and for turns against no edge.
+    `angle_rad` is the angle turned. `closure_error_rad` is the angle by which a turn missed its start; null for flips,
+    and if turns were not made against an edge.
     """
 
     kind: Literal["flip", "turn", "omitted"]

@@ -45,7 +45,7 @@ class IncrementsEntry(Entry):
 
 
 class AnglesEntry(Entry):
-    """Sweeps of a file that were solved from the angle turned from rest to rest: the numbers of their `rows`.
+    """Sweeps of a file that were solved from the angle turned between two rests; `rows` are their numbers in the file.
 
     `angle_std_rad`, `axis_std_rad`: largest standard deviations of a turn's end and axis, multiplied by
     `uncertainty_inflation` because the turns contradict each other.

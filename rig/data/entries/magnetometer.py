@@ -84,8 +84,8 @@ class MagnetometerEntry(Entry):
       F⁻¹ b.
     - arm_field_in_bias: whether the bias contains the arm's own field that turns with the flange, which no residual
       shows; a run with the sensor turned over separates the two (`rig reversal`).
-    - extension_m: its position on the flange; uniformity: test that the field was the same in all attitudes; drift:
-      test that it remained the same, null without tests.
+    - extension_m: the magnetometer's position on the flange; uniformity: test that the field was the same in all
+      attitudes; drift: test that it remained the same, null without tests.
     - covariance: of scale and bias, from the solution alone; covariance_combined: from all contributors in budget.
       field_t: the norm of the field to which the scale is relative.
     - field_base_t: the field in the arm's base frame; attitude_error_rad: error of the arm's attitudes about each axis,

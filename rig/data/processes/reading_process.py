@@ -53,7 +53,7 @@ class ReadingLimits:
 
     - `memory_bytes`: address space.
     - `processor_s`: time on a processor.
-    - `idle_s`: time without an end, in which waits for a processor or for the disk do not count.
+    - `idle_s`: time until its end, in which waits for a processor or for the disk do not count.
     - `written_bytes`: the size of each file that it writes, for its results and for unpacking.
     """
 

@@ -144,7 +144,7 @@ def _text(file: Any, name: str) -> str:
 def _convert(value: Any) -> Any:
     """Return an attribute in Python's own types.
 
-    Raise ValueError for an attribute that is longer than any of a run file.
+    Raise ValueError for an attribute that is longer than any that a run file has.
     """
     size = getattr(value, "size", 1) or 0  # an empty attribute has None
     if size > MAX_ATTRIBUTE_ELEMENTS or (isinstance(value, str | bytes) and len(value) > MAX_TEXT_CHARACTERS):

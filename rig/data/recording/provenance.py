@@ -88,7 +88,7 @@ class Provenance:
 
 
 def calls_itself_simulated(software: str) -> bool:
-    """Return whether a controller of this version is simulated; its seconds may then have any length."""
+    """Return whether a controller states by the name of its software that it is simulated."""
     return software.endswith(SIMULATED_SUFFIX)
 
 

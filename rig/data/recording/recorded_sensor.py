@@ -63,10 +63,7 @@ class RecordedSensor:
 
     @property
     def unseen_change_k(self) -> float:
-        """The change of temperature, K, that a recording may not show.
-
-        It is the step of the thermometer, the possible change of a stated temperature, or an assumed change.
-        """
+        """The change of temperature, K, that a recording may miss: a thermometer's step, or one stated or assumed."""
         return self.channel(TEMPERATURE).resolution if self.measures(TEMPERATURE) else UNKNOWN_CHANGE_K
 
     @property

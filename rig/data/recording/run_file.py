@@ -298,7 +298,7 @@ def _read_external(contents: Contents) -> ExternalReadings:
 
 
 def _whole_rows(rows: NDArray[Any]) -> NDArray[Any]:
-    """Return the rows before the unwritten end, whose host time is 0, which no written row has."""
+    """Return the rows that a killed process wrote completely. Rows that it had only reserved have the host time 0."""
     written = np.flatnonzero(rows["host_time_s"])
     count = int(written[-1]) + 1 if len(written) else 0
     return rows if count == len(rows) else rows[: max(count - 1, 0)]  # the last row may be incomplete

@@ -42,7 +42,7 @@ Vector3 = tuple[Finite, Finite, Finite]
 
 
 class ObservationThresholds(ObservationKeys):
-    """Conditions on an averaged revolution.
+    """The conditions under which a revolution is averaged.
 
     - `max_lost_fraction`: largest fraction of missing samples.
     - `max_speed_deviation`: largest deviation of the joint's smoothed rate from its mean, as a fraction.

@@ -15,7 +15,7 @@ Celsius = dict[str, Finite]
 class TemperatureWanted:
     """A request to warm or cool the sensors, now at `now_c`, until the first of them is at `next_c`.
 
-    The operator changes the temperature, or the board's heater if `heated`.
+    The operator changes the temperature; if `heated`, the board's heater does.
     """
 
     warming: bool

@@ -38,10 +38,7 @@ STATE_WORDS = {
 
 
 def recompute_csv(outcome: RecomputeOutcome) -> str:
-    """Return CSV with a line for each calibration, which states its most changed parameter.
-
-    A run without calibrations has one line.
-    """
+    """Return CSV: a line for each calibration, with its most changed parameter, or for a run without calibrations."""
     out = io.StringIO(newline="")
     writer = csv.DictWriter(out, COLUMNS, lineterminator="\n", restval="")
     writer.writeheader()

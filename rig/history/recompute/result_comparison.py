@@ -55,7 +55,7 @@ class RecomputedResult:
 
 @dataclass(frozen=True, slots=True)
 class Unsolved:
-    """The reason why recordings have no present result: its kind `state`, and `why` in words."""
+    """The reason why recordings have no present result: the kind of reason (`state`), and `why` in words."""
 
     state: State
     why: str
@@ -115,7 +115,7 @@ class ComparedResult:
 
     @property
     def moved(self) -> tuple[int, ...]:
-        """The calibrations, by number, with a value shifted, or a U grown, by more than `of_u` × stated U."""
+        """The numbers of the calibrations of which a value has shifted, or U has grown, by more than `of_u` × U."""
         return tuple(number for number, moves in self.moves.items() if moves and moves[0].size > self.of_u)
 
     @property

@@ -24,11 +24,11 @@ MIN_SCATTER = 1e-12  # relative to a value: the rounding of equal values is not 
 
 @dataclass(frozen=True, slots=True)
 class Chart:
-    """A control chart, all arrays (…, n).
+    """A control chart of n results: arrays (…, n).
 
-    `deviation` is NaN for the first results, and standard normal if the process is in control; `ewma` is the moving
-    average of `deviation`, and `limit` is the limit of `ewma`. `alarm` is true if `deviation` exceeds Shewhart's limit
-    or `ewma` exceeds `limit`. Results with an alarm are not used to judge later ones.
+    `deviation` is a result's deviation from the earlier ones: standard normal if the process is in control, NaN for the
+    first results. `ewma` is its moving average, and `limit` the limit of `ewma`. `alarm` is true if `deviation` exceeds
+    Shewhart's limit or `ewma` exceeds `limit`. Results with an alarm are not used to judge later ones.
     """
 
     deviation: Array

@@ -11,10 +11,10 @@ from rig.history.storage.journal import Head
 
 
 def refuse_lost(connection: Connection, address: HistoryAddress, before: Head, after: Head) -> None:
-    """Check the entries that lines of the journal record: the lines after `before`, up to `after`.
+    """Check that the entries in the journal's lines after `before`, up to `after`, are present and unchanged.
 
-    Raise Refused `entry_not_kept` if an entry or the last line is missing or changed. Also raise as
-    `continuity.refuse_another` does.
+    Raise Refused `entry_not_kept` for a missing or changed entry or last line, and what `continuity.refuse_another`
+    raises.
     """
     if not journal.has(connection, after):
         raise _entry_not_kept(address, f"entry {after.number} of its journal")

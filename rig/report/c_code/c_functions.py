@@ -13,10 +13,7 @@ from rig.report.findings.finding import Finding
 
 
 def gyroscope_lines(finding: Finding[GyroscopeEntry], sensitivities: Mapping[str, Array]) -> Iterator[str]:
-    """Yield C source for a calibrated gyroscope; nothing for a reference gyroscope.
-
-    `sensitivities` are the known g-sensitivities (3, 3), rad/s per m/s², by sensor.
-    """
+    """Yield C source for a calibrated gyroscope, with its g-sensitivity (3, 3) if known; nothing for a reference."""
     if finding.entry.role != "calibrate":
         return
     prefix, sensitivity = prefix_of(finding.sensor), sensitivities.get(finding.sensor)

@@ -88,8 +88,8 @@ class Certificate:
     """The content of a certificate.
 
     `marks` are printed across every page; a certificate without marks is ready to be signed. `conformity` are the
-    checks against the limits of the configuration, `fitness` the measurement's checks of itself. `reversals` are
-    results of turning magnetometers over, by the magnetometer's name.
+    checks of the items, `fitness` those of the measurement itself. `reversals` are results of turning magnetometers
+    over, by the magnetometer's name.
     """
 
     number: str

@@ -89,8 +89,8 @@ class Residuals:
 class Contributions:
     """Contributions to the combined uncertainties of one scale factor and one bias, on a logarithmic axis.
 
-    Each of `rows` is a contributor's name, its height, and its abscissas for the scale factor and for the bias. `axes`
-    are the sensor axes of the scale factor and of the bias, which are those of the printed budget.
+    Each of `rows` is a contributor's name, the height at which it is drawn, and its abscissas for the scale factor and
+    for the bias. `axes` are the sensor axes of both, which are those of the printed budget.
     """
 
     axes: tuple[str, str]

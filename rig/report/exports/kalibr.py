@@ -27,7 +27,7 @@ def kalibr_files(calibrations: ExportedCalibrations) -> Mapping[str, str]:
 
 
 def triangular(matrix: Array) -> tuple[Array, Array]:
-    """Return M, lower triangular with positive diagonal, and a rotation C (3, 3) whose product M · C is `matrix`."""
+    """Return M, lower triangular with a positive diagonal, and a rotation C, both (3, 3), such that M C = `matrix`."""
     q, r = np.linalg.qr(matrix.T)
     signs = np.sign(np.diag(r))
     return r.T * signs + 0.0, (q * signs).T  # no −0.0

@@ -23,7 +23,7 @@ Polynomials = Mapping[str, Mapping[str, OverTemperatureEntry]]  # by sensor and 
 
 
 def offset_of(quantity: str, entry: OverTemperatureEntry, order: int) -> tuple[float, ...]:
-    """Return, for each axis, the coefficient of power `order` of the temperature in the offset that is subtracted."""
+    """Return, for each axis, the coefficient of (T − reference)^`order` in the offset, which readings contain."""
     return tuple(quantities()[quantity].offset * bias for bias in entry.bias[order])
 
 

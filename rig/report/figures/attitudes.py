@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 class AttitudePlot:
     """The data of a sensor's plots: `residuals` (N, 3) of the mean readings in N attitudes.
 
-    `expected` (N, 3) are the standard deviations of the residuals that all known errors explain, `noise` (N, 3) those
-    that noise alone explains. `towards` (N, 3) is the reference (gravity or the field) in the sensor's nominal axes.
+    `expected` (N, 3) are the standard deviations of the residuals due to all known errors, `noise` (N, 3) those of the
+    mean readings due to noise. `towards` (N, 3) is the reference (gravity or field) in the sensor's nominal axes.
     """
 
     quantity: Quantity

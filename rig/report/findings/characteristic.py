@@ -35,10 +35,10 @@ class Units:
 
 @dataclass(frozen=True, slots=True)
 class Series:
-    """A characteristic's names in a history, `prefix` + label for each number, and the `words` that describe them.
+    """The presentation of a characteristic in a history, as one parameter for each of its numbers.
 
-    `drawn`: whether the history draws the numbers. `opposite`: whether the history stores the numbers with the opposite
-    sign of certificates.
+    A parameter is named `prefix` + label; `words` describe it, with a place for the label. `drawn`: whether the history
+    draws the parameters. `opposite`: whether it stores the numbers with the opposite sign of certificates.
     """
 
     prefix: str
@@ -53,7 +53,7 @@ class Characteristic:
 
     - `units`: returns the units for the quantity that the sensor measures.
     - `read`: returns the numbers in an entry; None if the entry does not have them.
-    - `series`: the names of its numbers in a history; None if a history does not store it, which `exempt` explains.
+    - `series`: its presentation in a history; None if a history does not store it, which `exempt` explains.
     - `exempt`: the forms of output that do not show it, each with the reason.
     - `remark`: returns the remark before ± U in the digital certificate, for an entry.
     """

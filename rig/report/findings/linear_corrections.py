@@ -78,10 +78,11 @@ class SensorCorrection:
 
 
 def noise_of(means: Sequence[AveragedInterval], at_rest: Sequence[tuple[Sequence[float], int]]) -> ReadingNoise:
-    """Return the readings' noise, from each rest's standard deviation of one sample and number of samples.
+    """Return the readings' sample rate and noise density.
 
-    The density is the standard deviation of the noisiest axis divided by the square root of the sample rate, which
-    holds for noise that is white up to half the rate. It is None without rests, as for attitudes that a file states.
+    `at_rest` has the standard deviation (3,) of one sample, and the number of samples, of each rest. The density is the
+    standard deviation of the noisiest axis divided by the square root of the sample rate, which holds for noise that is
+    white up to half the rate. It is None without rests, as for attitudes that a file states.
     """
     duration_s = sum(mean.duration_s for mean in means)
     rate_hz = sum(mean.samples for mean in means) / duration_s if duration_s > 0 else None

@@ -41,7 +41,7 @@ def _build_record(finding: Finding[GyroscopeEntry], _: object) -> HistoryRecord:
 
 
 def _describe_item(finding: Finding[GyroscopeEntry], _: object) -> CertifiedItem | None:
-    """Return the gyroscope as an item of the certificate, with its temperatures; None for a reference."""
+    """Return the certificate's item of the Earth's rate that this gyroscope measured; None for a reference."""
     sensor = finding.entry
     if finding.is_reference:
         return None

@@ -70,7 +70,7 @@ def _build_row(finding: Finding[OverTemperatureEntry]) -> DisplayRow:
 
 
 def _build_record(finding: Finding[OverTemperatureEntry], _: ResultDocument) -> HistoryRecord | None:
-    """Return the record of the slopes at the reference temperature, at which the calibration states scale and bias."""
+    """Return the record to which a history adds the slopes. Scale and bias are in the calibration's own record."""
     entry = finding.entry
     return HistoryRecord(
         finding.sensor,

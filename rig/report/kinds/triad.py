@@ -110,10 +110,7 @@ def attitude_lines(finding: Finding[Any]) -> Iterator[str]:
 
 
 def method_lines(entry: Any, quantity: Quantity, from_what: str = "") -> Iterator[str]:
-    """Yield a line for each method that was not chosen: its solution, or why it has none.
-
-    The method's name in the line is followed by `from_what`.
-    """
+    """Yield a line for each method not chosen, its name followed by `from_what`: its solution, or why it has none."""
     for method, other in entry.other_methods.items():
         if isinstance(other, ErrorEntry):
             yield f"{method}{from_what}: {other.error}"

@@ -29,7 +29,7 @@ class SignatureReport:
 
 @dataclass(frozen=True, slots=True)
 class FileInspection:
-    """The inspection of a file: its signatures, the files attached to the signed one, and problems by name."""
+    """The inspection of a file: its signatures, the contents of the files attached to it by name, and its problems."""
 
     signatures: tuple[SignatureReport, ...] = ()
     attached: Mapping[str, bytes] = field(default_factory=dict)

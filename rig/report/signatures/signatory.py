@@ -102,7 +102,7 @@ def _open_file(file: Path) -> Iterator[Signatory]:
 
 
 def _order_chain(certificates: "Sequence[Certificate]", key: Any) -> "list[Certificate]":
-    """Return the key's own certificate, then its issuers' certificates; an empty list if the first is missing."""
+    """Return the key's own certificate, then its issuers' certificates; an empty list without the key's own."""
     matching = [one for one in certificates if key is not None and one.public_key() == key.public_key()]
     return chain_of([matching[0], *certificates]) if matching else []
 

@@ -82,7 +82,7 @@ def sign_as_xades(xml: bytes, by: Signatory, reason: Reason) -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class _Key:
-    """A private key for signxml, possibly in a token, without access to its value."""
+    """A private key in the form that signxml expects: it signs, but its value, possibly in a token, stays hidden."""
 
     by: Signatory
     key_size: int

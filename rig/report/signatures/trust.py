@@ -52,7 +52,7 @@ def why_untrusted(
 
 
 def trust_anchors(trust: Trust) -> "list[CertTrustAnchor]":
-    """Return the trusted certificates with their own limits: path length, name constraints (RFC 5937) and last day."""
+    """Return the trusted certificates with the limits that they state: path length, names (RFC 5937) and last day."""
     from asn1crypto.x509 import Certificate
     from pyhanko_certvalidator.authority import CertTrustAnchor, TrustQualifiers, derive_quals_from_cert
     from pyhanko_certvalidator.policy_decl import PKIXValidationParams

@@ -198,7 +198,7 @@ def _speed(sensor: GyroscopeEntry) -> str:
 
 
 def _widths(budget: BudgetEntry) -> tuple[Expanded, Expanded]:
-    """Return the expanded uncertainties, of scale factors and of biases."""
+    """Return the expanded uncertainties of the scale factors, then those of the biases."""
     columns = budget.expanded, budget.coverage_factors, budget.coverage_probabilities
     return Expanded(*(column[:3] for column in columns)), Expanded(*(column[3:] for column in columns))
 

@@ -25,7 +25,7 @@ NO_ANSWER = (0x00, 0xFF, 0xFFFF)  # readings of a bus that does not answer, of o
 
 @dataclass(frozen=True, slots=True)
 class BoardSensorRow:
-    """A sensor that the firmware supports, with its configured name and stored calibration, if any, and its counts."""
+    """A sensor that the firmware supports, its sample `counts`, its configured name and stored calibration, if any."""
 
     info: SensorInfo
     configured_as: str | None

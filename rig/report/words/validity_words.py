@@ -43,10 +43,7 @@ def when_words(when: ConditionsEntry) -> str:
 
 
 def warmth_words(when: ConditionsEntry | None) -> str:
-    """Return the source of a temperature in words: the item's thermometer, a statement, or none.
-
-    Without `when` it is the thermometer.
-    """
+    """Return the source of a temperature in words: the item's thermometer (also without `when`), a statement, none."""
     if when is not None and when.temperature_c is None:
         return "temperature neither measured by the item nor stated"
     if when is not None and when.temperature_stated:
