@@ -80,7 +80,7 @@ class Quantity:
         return f"{what}_{self.suffix}"
 
     def label(self, sensor: str) -> str:
-        """Return the label of a sensor's readings: the name alone for a gyroscope's rates."""
+        """Return a label of a sensor's readings: the full label, or only the sensor's name for a gyroscope's rates."""
         return self.full_label(sensor) if self.prefix else sensor
 
     @property
@@ -89,7 +89,7 @@ class Quantity:
         return "" if self.name == RATE.name else f"{self.name}_"
 
     def full_label(self, sensor: str) -> str:
-        """Return a label of a sensor's readings that distinguishes them from its other quantities."""
+        """Return the sensor's name with the kind of sensor, such as `imu, accelerometer`, to label its readings."""
         return f"{sensor}, {self.sensor}"
 
     @property
@@ -109,7 +109,7 @@ class Quantity:
 
     @property
     def parameter_signs(self) -> tuple[float, ...]:
-        """The signs (1 or −1) of scale factors, then biases, relative to a model whose bias is part of the reading."""
+        """The signs of scale factors, then of biases: −1 for a bias that corrects readings and is not part of them."""
         return (1.0,) * len(self.axes) + (float(self.offset),) * len(self.axes)
 
 

@@ -428,9 +428,10 @@ class VerificationEntry(Entry):
 
 
 class MountEntry(Entry):
-    """The mounting of the item in a stage, counted from 1, and its error; both are relative to the first stage.
+    """The error of the item's mounting in a stage (counted from 1): its rotation from the nominal mounting.
 
-    `rotation_rad` is a rotation vector in the item's frame, `std_rad` has the standard deviations of its components.
+    The mounting in the first stage counts as exact. `rotation_rad` is a rotation vector in the item's frame, `std_rad`
+    has the standard deviations of its components.
     """
 
     stage: int

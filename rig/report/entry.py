@@ -50,7 +50,7 @@ def finite_or_none(number: float) -> float | None:
 
 
 def dof_or_none(dof: Array | None) -> list[Any] | None:
-    """Return degrees of freedom as lists (see `list_dof`), or None if the degrees of freedom are unknown."""
+    """Return degrees of freedom as lists, with infinity as null; None for unknown degrees of freedom."""
     return None if dof is None else list_dof(dof)
 
 

@@ -72,7 +72,7 @@ def make_mounter(control: str) -> Callable[[int], None]:
 def make_fitter(control: str) -> Callable[[str], None]:
     """Return the function with which the simulated operator mounts the part with a given serial number.
 
-    `control` is as in `make_mounter`; the function raises the same errors.
+    `control`: the laboratory's control channel. The function raises OSError or ValueError if the laboratory has ended.
     """
 
     def fit(part: str) -> None:

@@ -82,7 +82,7 @@ def _refuse_samples(path: Path) -> None:
 def _solve_recording(options: Namespace) -> int:
     """Recompute the result of a run folder or a run file.
 
-    Return 0 if it passed, else 1. `--set` changes the settings for the judgement, see `RunSettings.apply_overrides`.
+    Return 0 if it passed, else 1. `--set` changes the settings for the judgement, such as `limits.scale_std`.
     `--script` names the script of another user's recording.
     """
     from rig.data.recording.run_reading import reading_ahead

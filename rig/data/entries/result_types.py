@@ -45,10 +45,11 @@ class Entry(BaseModel):
 
 
 class ConditionsEntry(Entry):
-    """The time of readings, from start to end (UTC, by the arm controller's clock since the recording's start).
+    """The first, last and mean time (UTC) of readings, and their temperature.
 
-    `mean_utc` is the mean time. `temperature_c` and `temperature_range_c` are mean and range from the sensor's own
-    thermometer, null without one; a temperature without range was stated.
+    Times are the recording's start plus the time since then on the arm controller's clock. `temperature_c` and
+    `temperature_range_c` are mean and range from the sensor's own thermometer, null without one; a temperature without
+    range was stated.
     """
 
     from_utc: Utc

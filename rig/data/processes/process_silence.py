@@ -14,13 +14,13 @@ _Times = dict[str, tuple[float, float]]  # by thread: seconds on a processor, se
 
 
 class Silence:
-    """A counter of the ticks without a sign of life from the process `pid`.
+    """A counter of the intervals (ticks) without a sign of life from the process `pid`.
 
-    A tick is one interval between two looks at the process. Ticks are counted, not seconds, because the counting
-    process may itself be delayed. A tick is ignored if the thread that is expected to answer (`thread`, any if None)
-    mostly waited for a processor, unless the process was stopped. Linux shows this (proc(5)); on other systems no tick
-    is ignored. On a busy machine the limit of a silence grows by at most LARGEST_LOAD_FACTOR, because the arm must not
-    be left alone. Ignored ticks extend the limit further, by at most the factor `spared`.
+    Ticks are counted, not seconds, because the counting process may itself be delayed. A tick is ignored if the thread
+    that is expected to answer (`thread`, any if None) mostly waited for a processor, as Linux shows (proc(5)).
+
+    On a busy machine the limit of a silence grows by at most LARGEST_LOAD_FACTOR, and ignored ticks extend it by at
+    most the factor `spared`, because the arm must not be left alone for longer.
     """
 
     def __init__(self, pid: int, *, spared: int, thread: int | None = None) -> None:

@@ -129,7 +129,7 @@ _NAMES = {kind: name for name, kind in _KINDS.items()}
 
 @dataclass(frozen=True, slots=True)
 class TimedEvent:
-    """An event, its time on the host's monotonic clock, and its time on the controller's clock if known by then."""
+    """An event, its time on the host's monotonic clock, and its time on the controller's clock, None if unknown."""
 
     event: Event
     host_time_s: float

@@ -35,8 +35,8 @@ def rig_effects(rigs: Sequence[str], sensors: Sequence[str], values: Array, std:
     """Return the effects of rigs on results: result i has `values[i]` and `std[i]`, from `rigs[i]` and `sensors[i]`.
 
     The two-way model is value = sensor + rig + run, where the runs' effects are random (`random_effects.fit`). Within
-    each group of rigs connected by shared sensors, effects are relative to the rig with the most results. A rig that
-    shares no sensor has no effect.
+    each group of rigs connected by shared sensors, effects are relative to the rig with the most results. Rigs that
+    share no sensor, and groups with too few results, are left out.
     """
     effects: list[RigEffect] = []
     names = np.array(rigs)
@@ -49,6 +49,7 @@ def rig_effects(rigs: Sequence[str], sensors: Sequence[str], values: Array, std:
         rows = np.flatnonzero(np.isin(names, group_rigs))
         subjects = np.array(sensors)[rows]
         subject_names = list(dict.fromkeys(subjects.tolist()))
+        # Columns: one for each rig except the reference, then one for each sensor.
         design = np.column_stack(
             [names[rows] == rig for rig in others] + [subjects == name for name in subject_names]
         ).astype(np.float64)

@@ -42,9 +42,9 @@ def engine_of(address: HistoryAddress) -> Iterator[Engine]:
 
 @contextmanager
 def connection_apart(engine: Engine) -> Iterator[Connection]:
-    """Yield a new connection with its own view of the history."""
+    """Yield a new connection, not one of the pool, which may be the one that wrote the entries to be checked."""
     with engine.connect() as connection:
-        connection.invalidate()  # the pool's connection may be the one that wrote
+        connection.invalidate()  # the next use opens a new connection
         yield connection
 
 
@@ -67,7 +67,7 @@ def _make(file: Path, label: str) -> None:
 
 @contextmanager
 def _server_engine(server: URL) -> Iterator[Engine]:
-    """Yield an engine for this block alone, so that a frozen server delays no other block."""
+    """Yield an engine for this block alone: a connection to a server that hangs would delay other users of the pool."""
     engine = _postgresql(server)
     try:
         yield engine

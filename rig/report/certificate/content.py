@@ -138,7 +138,7 @@ class Certificate:
 
     @property
     def mounted(self) -> tuple[str, ...]:
-        """The measured mounting of the item in each stage after the first, one line for each."""
+        """The measured error of the item's mounting in each stage after the first, one line for each."""
         return tuple(mount_lines(self.result))
 
     @property

@@ -1,7 +1,7 @@
 """Temperature corrections of PX4 and ArduPilot: offsets of gyroscopes and accelerometers as cubic polynomials.
 
 PX4 (temperature_compensation, sensor_calibration): data − (X0 + X1 d + X2 d² + X3 d³) − offset, d = T − TREF, T limited
-to TMIN … TMAX. The offset at TREF is that of CAL_…, so X0 is 0.
+to TMIN … TMAX. The parameters CAL_… contain the offset at TREF, so X0 is 0.
 
 ArduPilot (AP_InertialSensor_tempcal, AP_InertialSensor_Backend): data − P(T − 35 °C) + P(CALTEMP − 35 °C) − offset,
 P(u) = 10⁻⁶ (c₁ u + c₂ u² + c₃ u³), both temperatures limited to TMIN … TMAX. Its 35 °C are fixed.

@@ -44,7 +44,7 @@ def _draw_all(figure: "Figure", drifts: Mapping[Quantity, BiasDrift]) -> None:
 
 
 def draw_drift(axes: "Axes", quantity: Quantity, drift: BiasDrift) -> None:
-    """Draw the bias in each repeat of the attitudes, with dotted lines at its steps.
+    """Draw the bias in each repeat of the attitudes, with dotted lines at its abrupt changes.
 
     Dots are biases estimated with scale and axes fixed, crosses those estimated together with scale and axes.
     """

@@ -12,12 +12,12 @@ from rig.station.plain_text import build_number_table, plain
 
 
 def heading_for(budget: BudgetEntry | None) -> str:
-    """Return the heading of a column: U if there is a budget, else two standard deviations."""
+    """Return the heading of a column of U, with the budget's largest coverage factor, or 2 without a budget."""
     return heading_of((COVERAGE_FACTOR,) if budget is None else budget.coverage_factors)
 
 
 def heading_of(factors: Sequence[float]) -> str:
-    """Return the heading of a column of U with the largest of its coverage `factors`."""
+    """Return the heading of a column of U, which states the largest of the coverage `factors`."""
     printed = sorted({round(factor, 2) for factor in factors})
     return f"± U (k {'=' if len(printed) == 1 else '≤'} {printed[-1]:g})"
 

@@ -1,4 +1,4 @@
-"""The measured mounting of the item in each stage of a run, in words. Pure.
+"""The measured errors of the item's mounting in the stages of a run, in words. Pure.
 
 If each stage turns the item about only one axis, the mounting cannot be measured, and these functions yield nothing.
 """
@@ -14,7 +14,7 @@ MIN_MEASURED_RATIO = 1e-6  # ratio to its uncertainty, below which a rotation is
 
 
 def mount_lines(result: ResultDocument) -> Iterator[str]:
-    """Yield a line on each stage's mounting relative to the first stage's; nothing if the mounting never changed."""
+    """Yield a line on the mounting error in each stage in which it was measured, always after the first stage."""
     yield from map(_line, _significant_mounts(result))
 
 
