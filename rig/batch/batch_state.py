@@ -53,7 +53,7 @@ class Chip:
 
 @dataclass(frozen=True, slots=True)
 class PartEnded:
-    """The outcome of the present part.
+    """The outcome of the part that was begun last.
 
     - why: the reason of the outcome, empty for a passed part.
     - certificate: its number, empty without one.

@@ -21,7 +21,7 @@ def meanings() -> Mapping[str, str]:
 def meaning_of(entry: str, key: str) -> str:
     """Return the meaning of a key in an entry; `entry` is the class' name without the ending `Entry`.
 
-    Names of standard uncertainties and degrees of freedom state their meaning. Raise KeyError for an unknown key.
+    The meaning of a standard uncertainty or of degrees of freedom follows from the key. Raise KeyError if unknown.
     """
     table = meanings()
     if (meaning := table.get(f"{entry}.{key}", table.get(key))) is not None:

@@ -450,7 +450,7 @@ class ResultDocument(Entry):
     - unsolved: why a quantity of external readings has no solution, by sensor, then by the quantity's name.
     - omitted: parts left out of external readings; notes: remarks on how they were read.
     - others: results of kinds that packages add, by the kind's key, in the package's own format.
-    - mounts: the item's mounting in each stage of a run except the first.
+    - mounts: the error of the item's mounting in each stage of a run except the first.
 
     Sensors' names follow the rules of a configuration, because they become names of files.
     """

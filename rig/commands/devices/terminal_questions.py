@@ -16,7 +16,7 @@ def ask(
 ) -> str:
     """Return the answer to a question: the option's value, or text typed by the user, requested until it is valid.
 
-    `valid` converts an answer and raises ValueError for an invalid one. `usual` is the meaning of Enter. Raise Refused
+    `valid` converts an answer and raises ValueError for an invalid one. Enter alone answers `usual`. Raise Refused
     `not_answered`, and `bad_option` for an invalid option.
     """
     if value is not None:

@@ -223,7 +223,7 @@ def void(options: Namespace) -> int:
 
 
 def open_named_history(options: Namespace) -> AbstractContextManager[History]:
-    """Return the named history as a context manager.
+    """Return a context manager that opens the named history.
 
     Raise Refused `no_history` if there is none, because opening would make an empty one, and what `open_history`
     raises; what `load` raises if a configuration names the history.
@@ -271,7 +271,7 @@ def _find_run_folders(folders: list[Path], *, unsolved: bool) -> Iterator[Path]:
 
 
 def _recompute_finished(folder: Path, history: History, *, solve: bool) -> FinishedRun:
-    """Return the run with its result recomputed from its recordings, unless the history already has it.
+    """Return the run. Its result is recomputed from its recordings, unless the history already has the result.
 
     A result.json alone proves nothing, so it must agree with the recordings; with `solve` a result.json that does not
     agree is replaced. Raise Refused `no_recording`, `result_not_of_recording`, and the errors of the recordings'

@@ -59,7 +59,8 @@ class FieldDwellEntry(Entry):
 class UniformityEntry(Entry):
     """A test that the field is the same in all attitudes: χ² of the residuals, with its critical value.
 
-    `attitude_error_rad` is the assumed error of the attitudes about each axis, from the accelerometer.
+    `attitude_error_rad` is the error of the attitudes about each axis that the test allows for: an upper bound (2σ)
+    from an accelerometer.
     """
 
     chi_square: float

@@ -42,7 +42,7 @@ MAX_STATE = 1e12  # of a turner, in SI units, times included
 
 
 class RunRecorder:
-    """The writer of a run file, from any number of threads; data are on their way to the disk within 0.5 s.
+    """The writer of a run file, for any number of threads at once; data are passed to the disk within 0.5 s.
 
     `config` is the configuration's text without its `world:` section. The folder of `path` must exist and the file must
     not. The methods that add data never wait for the disk and do not report the disk's failures, so that a full disk

@@ -1,7 +1,7 @@
 """Creation of a history's tables when it is opened, or their migration from an older version.
 
 A migration is a function that brings the tables of a connection to the next version. All migrations run in one
-transaction and only add, so that entries remain unchanged. Other versions are refused.
+transaction and only add, so that entries remain unchanged. Versions without a migration are refused.
 """
 
 from collections.abc import Callable, Mapping

@@ -29,8 +29,8 @@ _DECLARATION = re.compile(
 def read_xml(content: bytes) -> Any:
     """Return the root of a document in UTF-8 or UTF-16, with or without a declaration.
 
-    The bytes determine the encoding, so that all readers see the same text. Raise ValueError for another encoding, a
-    declaration that contradicts the bytes or a document type, and the errors of lxml.
+    The bytes determine the encoding, so that all readers see the same text. Raise ValueError for another encoding, for
+    a declaration that contradicts the bytes, and for a document type; also raise the errors of lxml.
     """
     codec, names = _ENCODINGS.get(content[:2], _UTF_8)
     text = content.decode(codec)

@@ -1,4 +1,4 @@
-"""The uncertainty budget in print, for one axis, with lines that add up to U.
+"""The uncertainty budget of one scale factor and one bias in print, with lines that add up to U.
 
 Terminal and certificate print the same budget; `result.json` has the budgets of all six values.
 """
