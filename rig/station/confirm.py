@@ -24,12 +24,12 @@ def ask_operator(announcement: Sequence[str], to_do: str = "start") -> bool:
 
 
 def require_agreement(announcement: Sequence[str], to_do: str, assume_yes: bool) -> None:
-    """Raise Refused `not_confirmed` unless the operator agrees."""
+    """Raise Refused `not_confirmed` unless the operator agrees, now or in advance (`assume_yes`)."""
     if not assume_yes and not ask_operator(announcement, to_do):
         raise Refused("not_confirmed", "the operator did not agree to the change", AGREEMENT_REMEDY)
 
 
 def refuse_unless_answerable(assume_yes: bool) -> None:
-    """Raise Refused `not_confirmed` without a terminal, before a long action that ends with a question."""
+    """Raise Refused `not_confirmed`, before a long action, if no terminal can answer the question at its end."""
     if not assume_yes and not sys.stdin.isatty():
         raise Refused("not_confirmed", "there is no terminal at which to agree to the change", AGREEMENT_REMEDY)

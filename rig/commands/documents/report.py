@@ -140,9 +140,9 @@ def _write_signed(options: Namespace, by: "Signatory | None") -> tuple[list[Path
 def _make_digital(
     certificate: "Certificate", by: "Signatory | None", reason: "Reason", left_out: list[Refused] | None
 ) -> dict[str, bytes]:
-    """Return the digital certificate by its file name, signed if there is a signatory; empty if it could not be made.
+    """Return the digital certificate by its file name, signed if a signatory (`by`) is given.
 
-    If it could not be made, the error is appended to `left_out`, or printed if `left_out` is None.
+    If it cannot be made, return no file; the error is appended to `left_out`, or printed if `left_out` is None.
     """
     from rig.report.certificate.dcc import DCC, digital_certificate
 

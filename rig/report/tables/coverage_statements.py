@@ -50,7 +50,10 @@ def coverage_sentence(budget: BudgetEntry) -> str:
 
 
 def _group(budget: BudgetEntry, factors: Sequence[str], first: int, name: str) -> str:
-    """Return the coverage factors of three axes with degrees of freedom in words; equal factors are given once."""
+    """Return the coverage factors of three axes, from the index `first`, with degrees of freedom, in words.
+
+    Equal factors are given once.
+    """
     axis_factors, dofs = factors[first : first + 3], budget.effective_dof[first : first + 3]
     if len(set(axis_factors)) == 1:
         return f"{name} k\u00a0=\u00a0{axis_factors[0]} (ν_eff\u00a0≥\u00a0{dof_text(min(dofs))})"

@@ -19,7 +19,7 @@ class Expanded:
 
 
 def expanded(stds: Sequence[float], counted: Sequence[Freedom] | None) -> Expanded:
-    """Return U = k u for standard uncertainties u (`stds`): k is Student's t, or 2 without degrees of freedom."""
+    """Return U = k u of uncertainties u (`stds`): k is Student's t for the degrees of freedom `counted`, else 2."""
     dofs = [np.inf if dof is None else dof for dof in counted or [None] * len(stds)]
     factors = coverage_factors(dofs)
     return Expanded((factors * np.array(stds)).tolist(), factors.tolist(), coverage_probability(factors, dofs).tolist())
