@@ -127,7 +127,7 @@ class Batch:
         return next((part for part in reversed(self.parts) if part.serial == serial and _has_verdict(part)), None)
 
     def same_chip(self, chip: Chip, serial: str) -> BatchPart | None:
-        """Return the newest part that has this chip, a verdict, and another number than `serial`; None without one."""
+        """Return the newest part with this chip, a verdict and a serial number other than `serial`, if any."""
         for part in reversed(self.parts):
             earlier = part.ended.chip if part.ended is not None and _has_verdict(part) else None
             if part.serial != serial and earlier is not None and earlier.is_that(chip):
@@ -174,7 +174,7 @@ class Doubt:
 
 
 def doubt_of(serial: str, batch: Batch, section: StationSection, today: Callable[[str], str | None]) -> Doubt | None:
-    """Return the objection to running this serial number now, or None; `today` describes its earlier run today."""
+    """Return the objection to running this serial number now, or None; `today` describes its run of today, if any."""
     try:
         check_serial_number(serial)
     except ValueError as error:

@@ -47,7 +47,7 @@ class Operator:
         return answer or None
 
     def is_mounted(self, part: BatchPart) -> bool:
-        """Ask whether the part is mounted. Without an operator, return True; False puts the part aside."""
+        """Ask whether the part is mounted, and return the answer: True without an operator. False puts it aside."""
         text = f"{part.serial}: mount it, plug in its board, step back; then Enter (no: put it aside):"
         with self._asking("to mount the part"):
             return self.voice is None or self._agrees("mount", text)

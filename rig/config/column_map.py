@@ -41,7 +41,7 @@ class ColumnSection(Section):
     @field_validator("column", mode="before")
     @classmethod
     def convert_number_to_text(cls, value: object) -> object:
-        """Return a column that is given as an integer as text, because a file's headings are texts."""
+        """Convert a column that is given by an integer to text, because the headings of a file are texts."""
         return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
 
     @field_validator("unit")

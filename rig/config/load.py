@@ -389,7 +389,7 @@ def _world_fits(config: RigConfig, world: WorldSection) -> Iterator[str]:
 
 
 def _instruments_fit(config: RigConfig, world: WorldSection) -> Iterator[str]:
-    """Yield a conflict for each sensor that the world simulates as an instrument that the rig does not read there."""
+    """Yield a conflict for each sensor that the world simulates as an instrument but the rig reads in another way."""
     for name in sorted(config.sensors.keys() & world.sensors.keys()):
         where = "the sensor is on the board" if name in config.on_board else "the sensor is at another's port"
         if world.sensors[name].kvh1775 is not None and config.sensors[name].part != "kvh1775":

@@ -200,7 +200,7 @@ def changes_between(before: Sequence[Past], now: Sequence[Past]) -> dict[Subject
 
 
 def rig_states(pasts: Sequence[Past]) -> list[RigState]:
-    """Return the state of every rig that calibrated a check standard, a sensor that any of its runs declares as one."""
+    """Return the state of every rig that calibrated a check standard: a sensor that any of its runs declared as one."""
     # Drifts and curves are not standards, and external readings have no rig.
     by_subject = subjects([past for past in pasts if past.quantity in quantities() and past.rig != NO_ARM])
     standards = {key: series for key, series in by_subject.items() if any(past.check_standard for past in series)}

@@ -108,7 +108,7 @@ def _read_content(file: Path) -> bytes:
 def _look_up(
     named: str, contents: Mapping[Path, bytes], looks: "Mapping[Path, FileInspection]"
 ) -> "dict[Path, FileEntries]":
-    """Return the entries of each file in the history whose name is `named`.
+    """Return the entries that the history `named` has of each file.
 
     Raise Refused `history_unreachable`, and what `open_history` raises.
     """

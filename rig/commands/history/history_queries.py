@@ -68,7 +68,7 @@ def list_calibrations(options: Namespace) -> int:
 
 
 def show(options: Namespace) -> int:
-    """Print one calibration, or all of a sensor's last run, and its folders; return 0. Raise `not_in_history`."""
+    """Print one calibration, or all of a sensor's last run, and the run's folders; return 0. Raise `not_in_history`."""
     with open_named_history(options) as history:
         pasts = _find_shown(history, options.calibration)
         (kept,) = history.kept(pasts[-1].run_id)

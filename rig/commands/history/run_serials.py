@@ -36,8 +36,8 @@ def find_other_board(
 ) -> str | None:
     """Return the serial number of the newest calibration on this `board`, with its date, if it is another sensor's.
 
-    Only calibrations of the `parts`, in a laboratory that is `simulated` or not, count. Return None if there is none,
-    if the serial number is one of `own_serial_numbers`, or if the history does not answer.
+    Only calibrations of the `parts` count, from simulated laboratories if `simulated`, else from real ones. Return None
+    if there is none, if the serial number is one of `own_serial_numbers`, or if the history does not answer.
     """
     from rig.history.storage.address import choose_history_address
 

@@ -55,7 +55,7 @@ class ByHandSection(ProcedureSection):
     )
 
     def problems(self, config: RigConfig) -> Iterator[str]:
-        """Yield the sensors that do not suit: by their part, an unknown clock, or a data rate too low for a hand."""
+        """Yield the sensors that are unsuitable by their part, an unknown clock, or too low a data rate for a hand."""
         others = [name for name, sensor in config.sensors.items() if not sensor.on_board]
         if others and "crystal_ppm" not in config.uncertainty.model_fields_set:
             yield (

@@ -24,7 +24,7 @@ class LinkLoad:
 
     @property
     def bytes_per_sample(self) -> float:
-        """The bytes of one sample in a message of several samples, including its fraction of head and frame."""
+        """The bytes of one sample in a message of several samples, including its fraction of the message's overhead."""
         message = MESSAGE_BY_NAME[self._message]
         item, head = message.item_dtype.itemsize, message.head.size
         full_frame = (PAYLOAD_MAX - head) // item

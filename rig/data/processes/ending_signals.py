@@ -56,7 +56,7 @@ class Interrupts:
         self._first_s: float | None = None  # arrival of the signal that waits for a lock
 
     def send_lost_again(self) -> None:
-        """Begin to send each signal again whose exception Python drops, as in a destructor or in a callback."""
+        """Begin to resend signals: each whose exception Python has dropped, as in a destructor or in a callback."""
         if sys.unraisablehook != self._resend:
             self._report, sys.unraisablehook = sys.unraisablehook, self._resend
 

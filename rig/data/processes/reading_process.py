@@ -49,7 +49,7 @@ TIME_LIMIT_SIGNAL = getattr(signal, "SIGXCPU", None)  # to a process that has us
 
 @dataclass(frozen=True, slots=True)
 class ReadingLimits:
-    """The resources of a process that reads a file.
+    """The limits of a process that reads a file.
 
     - `memory_bytes`: address space.
     - `processor_s`: time on a processor.

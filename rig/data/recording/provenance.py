@@ -88,7 +88,7 @@ class Provenance:
 
 
 def calls_itself_simulated(software: str) -> bool:
-    """Return whether a controller states by the name of its software that it is simulated."""
+    """Return whether the name of a controller's software states that the controller is simulated."""
     return software.endswith(SIMULATED_SUFFIX)
 
 

@@ -63,7 +63,7 @@ class RecordedSensor:
 
     @property
     def unseen_change_k(self) -> float:
-        """The change of temperature, K, that a recording may miss: a thermometer's step, or one stated or assumed."""
+        """The possible unrecorded change of temperature, K: the thermometer's step, or a stated or assumed change."""
         return self.channel(TEMPERATURE).resolution if self.measures(TEMPERATURE) else UNKNOWN_CHANGE_K
 
     @property

@@ -38,7 +38,7 @@ STATE_WORDS = {
 
 
 def recompute_csv(outcome: RecomputeOutcome) -> str:
-    """Return CSV: a line for each calibration, with its most changed parameter, or for a run without calibrations."""
+    """Return CSV with a line for each calibration (its most changed parameter) and for each run that has none."""
     out = io.StringIO(newline="")
     writer = csv.DictWriter(out, COLUMNS, lineterminator="\n", restval="")
     writer.writeheader()

@@ -79,7 +79,7 @@ class Block:
 
     @property
     def macro(self) -> str:
-        """The name of the macro in this file."""
+        """The name of the macro in the template's file."""
         return self.macro_path.partition(":")[2]
 
 
@@ -357,7 +357,7 @@ def _find_rest_calibrations(result: ResultDocument, stated: StatedFacts) -> Iter
 
 
 def _size_stated(budget: BudgetEntry) -> bool:
-    """Return whether the standard's uncertainty was stated; in a budget such a one is normal, an assumed one is not."""
+    """Return whether the standard's uncertainty was stated, so that the budget has a normal contributor of type B."""
     return any(line.kind == "B" and line.distribution == "normal" for line in budget.contributors)
 
 

@@ -33,7 +33,7 @@ def check_words() -> Mapping[str, CheckWords]:
 
 
 def words_of(check: CheckEntry) -> CheckWords | None:
-    """Return the words of a result's check; None for a check that checks.txt does not have, as of a package."""
+    """Return the words of a result's check; None for a check that is not in checks.txt, such as a package's."""
     return check_words().get(check.means.what or "")
 
 

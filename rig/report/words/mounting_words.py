@@ -14,7 +14,7 @@ MIN_MEASURED_RATIO = 1e-6  # ratio to its uncertainty, below which a rotation is
 
 
 def mount_lines(result: ResultDocument) -> Iterator[str]:
-    """Yield a line on the mounting error in each stage in which it was measured, always after the first stage."""
+    """Yield a line on the mounting error in each stage after the first, if the error was measured."""
     yield from map(_line, _significant_mounts(result))
 
 

@@ -43,7 +43,7 @@ def when_words(when: ConditionsEntry) -> str:
 
 
 def warmth_words(when: ConditionsEntry | None) -> str:
-    """Return the source of a temperature in words: the item's thermometer (also without `when`), a statement, none."""
+    """Return the source of a temperature in words: the thermometer (also without `when`), a statement, or none."""
     if when is not None and when.temperature_c is None:
         return "temperature neither measured by the item nor stated"
     if when is not None and when.temperature_stated:
@@ -91,7 +91,7 @@ def has_contributor(budget: BudgetEntry | None, name: str) -> bool:
 
 
 def list_omitted_rates(sensor: GyroscopeEntry, *, external: bool = False) -> str:
-    """Return the errors that a gyroscope's U omits; if a file gives the motion (`external`), these are more."""
+    """Return the errors that a gyroscope's U omits; with `external`, also those of motion that a file gives."""
     bent = EXCLUSIONS if sensor.nonlinearity is not None else ("nonlinearity at other speeds", *EXCLUSIONS)
     return ", ".join(("the effect of gravity", *FILE_EXCLUSIONS, *bent) if external else bent)
 
