@@ -118,7 +118,7 @@ def _make_folder(folder: Path, *, named_by_user: bool) -> None:
 
 
 def _read_calibrations(run: Path, moved: tuple[str, str] | None) -> "ExportedCalibrations":
-    """Return a passed run's calibrations, or those at the temperature `moved[0]` by the slopes in the run `moved[1]`."""
+    """Return a passed run's calibrations: if given, at the temperature `moved[0]`, by slopes of the run `moved[1]`."""
     from rig.data.result_file import read_passed_result, read_result
     from rig.report.exports.exported_corrections import calibrations
     from rig.report.exports.temperature import move_to_temperature

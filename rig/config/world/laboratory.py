@@ -324,10 +324,7 @@ Flicker = Annotated[float, Field(ge=0, le=0.1, description="flicker of the bias:
 
 
 class SimulatedAccelerometerSection(Section):
-    """The truth of one accelerometer, whose reading of a specific force s is a = F (s + φ s²) + b.
-
-    It has the temperature of the gyroscope.
-    """
+    """The truth of one accelerometer at the gyroscope's temperature. A specific force s reads a = F (s + φ s²) + b."""
 
     scale: RowLengths = (1.0, 1.0, 1.0)
     bias_m_s2: Vector3 = Field(default=NO_ROW, description="bias b of each axis, part of the reading")
