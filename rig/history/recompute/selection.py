@@ -26,6 +26,7 @@ def list_stated_results(history: History, selection: Selection) -> tuple[StatedR
     pasts: dict[int, list[Past]] = defaultdict(list)
     for past in history.calibrations(selection, replaced_too=True):
         pasts[past.run_id].append(past)
+    # A serial number or a part selects calibrations, and so the runs that have them; other criteria select runs.
     includes_all = selection.serial_number is None and selection.part is None
     query = select(
         _RUN.id,

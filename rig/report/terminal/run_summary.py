@@ -59,6 +59,8 @@ def ending(
     def lines_of(*texts: str) -> int:
         return sum(len([*_wrap(text, max(width, MIN_WIDTH))]) for text in texts)
 
+    # Always printed: the values, one failure, the summary, `needed`. The remaining lines are for optional texts first,
+    # then for further failures.
     room = (MAX_LINES_ONE if len(items) == 1 else MAX_LINES_MANY) - len([*_values(items, max(width, MIN_WIDTH))])
     room -= lines_of(*_first_failures(broken, 1), summary, *needed[0], *needed[1]) + len(files) + 1
     spare = []
