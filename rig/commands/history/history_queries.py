@@ -225,8 +225,8 @@ def void(options: Namespace) -> int:
 def open_named_history(options: Namespace) -> AbstractContextManager[History]:
     """Return a context manager that opens the named history.
 
-    Raise Refused `no_history` if there is none, because opening would make an empty one, and what `open_history`
-    raises; what `load` raises if a configuration names the history.
+    Raise Refused `no_history` if there is none, because opening would make an empty one; any that `open_history`
+    raises; and, if a configuration names the history, any that `load` raises.
     """
     return _open_existing(_read_address(options))
 

@@ -41,7 +41,8 @@ def add(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     """Print the content of the files and the commands that can use them; with `--write` save their column map.
 
-    Return 0. Raise Refused `bad_option`, `no_latest_run`, `configuration_not_written`, and as the files' readers do.
+    Return 0. Raise Refused `bad_option`, `no_latest_run`, `configuration_not_written`, or any that the files' readers
+    raise.
     """
     from rig.analysis.log_contents import correct_rate_unit, is_incomplete, join_maps, look_at
 

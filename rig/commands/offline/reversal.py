@@ -17,8 +17,8 @@ def add(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     """Print the biases that the runs together determine, and write them to `--out`.
 
-    Return 0. Raise Refused `report_folder`, and Refused and Fault as `open_run`, `turner_of`, `judge_phases` and
-    `reversals` do.
+    Return 0. Raise Refused `report_folder`, and any Refused or Fault that `open_run`, `turner_of`, `judge_phases` and
+    `reversals` raise.
     """
     from rig.analysis.reversal import reversals
     from rig.config.files.safe_writing import write_new

@@ -224,7 +224,7 @@ def write_elsewhere(path: Path, run: RunData) -> None:
 def make_plain(path: Path) -> None:
     """Rewrite a killed run's file, which only SWMR readers can open, so that any HDF5 tool can open it.
 
-    No process may be writing the file. Raise Refused as `read_run` does; OSError.
+    No process may be writing the file. Raise Refused as `read_run` does, and OSError if the file cannot be written.
     """
     contents = _contents(path, None)
     samples = {name: _whole_rows(rows) for name, rows in contents.samples.items()}
