@@ -3,13 +3,24 @@
 `catalogue` has every name in one table, from which docs/errors.md is made.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TypeVar
 
 from firmware_host.problem import Problem, ProblemError
 
-__all__ = ["Fault", "Problem", "ProblemError", "Refused", "RigError", "Unprinted", "or_fault", "raise_as", "refuse"]
+__all__ = [
+    "Fault",
+    "Problem",
+    "ProblemError",
+    "Refused",
+    "RigError",
+    "Unprinted",
+    "name_sensor",
+    "or_fault",
+    "raise_as",
+    "refuse",
+]
 Result = TypeVar("Result")
 INTERRUPTED_STATUS = 130  # exit status of an interrupted command: 128 + SIGINT, as in a shell
 
@@ -53,6 +64,17 @@ def raise_as(kind: type[RigError]) -> Iterator[None]:
         if isinstance(error, (kind, Refused)):
             raise
         raise kind.from_problem(error.problem) from error
+
+
+@contextmanager
+def name_sensor(name: str, sensors: Collection[str]) -> Iterator[None]:
+    """Put the sensor's `name` before what a Fault in the block says, unless it is the only one of the `sensors`."""
+    try:
+        yield
+    except Fault as fault:
+        if len(sensors) < 2:
+            raise
+        raise Fault(fault.name, f"{name}: {fault.what}", fault.remedy) from fault
 
 
 def refuse(problems: Sequence[Problem]) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 from rig.data.quantity import RATE, Quantity
 from rig.data.recording.run_data import RunData
 from rig.data.recording.settings import ObservationThresholds
+from rig.errors import name_sensor
 from rig.estimation.arrays import Array, median
 from rig.observation.average import Stream, convert_stream
 from rig.observation.clocks.time_base import TimeBase
@@ -104,7 +105,10 @@ def observe_run(
     mount, if determined.
     """
     motion = motion_of(run, correction)
-    sensors = {name: observe_sensor(run, name, motion, thresholds, superseded) for name in run.measuring(RATE)}
+    sensors = dict[str, SensorObservations]()
+    for name in run.measuring(RATE):
+        with name_sensor(name, run.sensors):
+            sensors[name] = observe_sensor(run, name, motion, thresholds, superseded)
     return ObservedRun(run, motion, sensors)
 
 

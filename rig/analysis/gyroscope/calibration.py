@@ -14,7 +14,7 @@ from rig.analysis.gyroscope.vector_inputs import collect_inputs, list_given, lis
 from rig.data.recording.motion_file import Item
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.run_data import RunData
-from rig.errors import Fault, Refused
+from rig.errors import Fault, Refused, name_sensor
 from rig.errors.attempts import attempt
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.accumulator import Accumulator, SixObservationEstimator, Solution
@@ -145,10 +145,12 @@ def solve_observed(
     `unknown_estimator`; Fault `duplicated_observation` and as the estimators do.
     """
     chosen = find_estimator(estimator)
-    return {
-        name: _solve_sensor(name, sensor, recordings, environment, chosen, whole_matrix=name in matrix_corrected)
-        for name, sensor in sensors.items()
-    }
+    results = dict[str, SensorResult]()
+    for name, sensor in sensors.items():
+        with name_sensor(name, sensors):
+            whole_matrix = name in matrix_corrected
+            results[name] = _solve_sensor(name, sensor, recordings, environment, chosen, whole_matrix=whole_matrix)
+    return results
 
 
 def _solve_sensor(

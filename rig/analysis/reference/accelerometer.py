@@ -1,6 +1,7 @@
 """The calibration of accelerometers on an arm, from dwells in known attitudes (the paper TRIAX, III-B) and sweeps."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from types import MappingProxyType
@@ -21,8 +22,9 @@ from rig.analysis.reference.triad import (
 from rig.data.quantity import ACCELERATION
 from rig.data.recording.recorded_sensor import RecordedSensor
 from rig.data.recording.settings import PlannedDwell, RunSettings, Site
-from rig.errors import Fault
+from rig.errors import Fault, name_sensor
 from rig.errors.attempts import Attempts, attempt_each
+from rig.errors.remedies_by_method import remedies_by_method
 from rig.estimation.arrays import Array
 from rig.estimation.gyroscope.budget import Budget
 from rig.estimation.reference.accelerometer import specific_force
@@ -123,11 +125,23 @@ def calibrate_accelerometers(
     if not settings.planned_dwells:
         return {}
     described = recordings[0].run.sensors
-    return {
-        name: _calibrate(name, recordings, settings, settings.site, gyroscopes.get(name))
-        for name in settings.to_calibrate
-        if described[name].measures(ACCELERATION)
-    }
+    results = dict[str, AccelerometerResult]()
+    for name in settings.to_calibrate:
+        if described[name].measures(ACCELERATION):
+            with name_sensor(name, described), _advise_on_arm():
+                results[name] = _calibrate(name, recordings, settings, settings.site, gyroscopes.get(name))
+    return results
+
+
+@contextmanager
+def _advise_on_arm() -> Iterator[None]:
+    """Raise a Fault `attitude_untrustworthy` with the remedy for an arm, whose attitudes no file states."""
+    try:
+        yield
+    except Fault as fault:
+        if fault.name != "attitude_untrustworthy":
+            raise
+        raise Fault(fault.name, fault.what, remedies_by_method(fault.name)["arm"]) from fault
 
 
 def _calibrate(

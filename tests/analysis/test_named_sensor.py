@@ -1,0 +1,38 @@
+"""A fault of one of several sensors names the sensor, and says what to do about it on an arm."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rig.analysis.analyses import calibrate
+from rig.data.recording.run_file import read_run
+from rig.errors import Fault, name_sensor
+from rig.observation.observed_run import observe_runs
+from support.paths import RECORDINGS
+
+
+def test_lost_samples_of_one_of_two_sensors_are_named_as_its_own() -> None:
+    run = read_run(RECORDINGS / "verified" / "run.h5")
+    samples = run.samples["reference"]
+    begin = len(samples) // 4
+    damaged = replace(run, samples={**run.samples, "reference": np.delete(samples, slice(begin, begin + 60))})
+    with pytest.raises(Fault, match=r"^lost_samples: reference: in sweep 1 "):
+        observe_runs([damaged])
+
+
+def test_a_fault_of_the_only_sensor_is_raised_as_it_is() -> None:
+    fault = Fault("stuck_axis", "it repeats", "Look")
+    with pytest.raises(Fault) as raised, name_sensor("gyro", ["gyro"]):
+        raise fault
+    assert raised.value is fault
+
+
+@pytest.mark.slow
+def test_an_accelerometer_that_was_knocked_on_the_arm_is_advised_about_the_arm() -> None:
+    run = read_run(RECORDINGS / "imu" / "run.h5")
+    samples = run.samples["gyro"].copy()
+    samples["acceleration_counts"][3 * len(samples) // 4 :, 0] += 400
+    with pytest.raises(Fault, match=r"attitude_untrustworthy: .*on the flange") as raised:
+        calibrate([replace(run, samples={"gyro": samples})], "vector")
+    assert "body to table" not in raised.value.remedy
