@@ -245,11 +245,10 @@ def test_a_history_is_in_the_user_s_folder_unless_somebody_says_otherwise(monkey
     assert usual is not None and usual.where == Path("/somewhere/share/calibration-rig/history.sqlite")
     said = choose_history_address(HistorySection(url="/data/rig.sqlite"), {})
     assert said is not None and said.where == Path("/data/rig.sqlite")
-    told = choose_history_address(
-        HistorySection(url="/data/rig.sqlite", off=True), {"RIG_HISTORY": "/tmp/other.sqlite"}
-    )
+    told = choose_history_address(HistorySection(url="/data/rig.sqlite"), {"RIG_HISTORY": "/tmp/other.sqlite"})
     assert told is not None and told.where == Path("/tmp/other.sqlite")
     assert choose_history_address(HistorySection(off=True), {}) is None
+    assert choose_history_address(HistorySection(off=True), {"RIG_HISTORY": "/tmp/other.sqlite"}) is None
     assert choose_history_address(HistorySection(), {"RIG_HISTORY": "off"}) is None
 
 

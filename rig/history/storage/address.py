@@ -31,13 +31,13 @@ class HistoryAddress:
 def choose_history_address(
     section: "HistorySection", environment: Mapping[str, str] = os.environ
 ) -> HistoryAddress | None:
-    """Return a run's history, from the environment (`RIG_HISTORY`) or else the configuration; None if switched off.
+    """Return a run's history, from the environment (`RIG_HISTORY`) or else the configuration; None if either is off.
 
     `section` must be from a configuration that the user has named or run before, never from another user's folder.
     Raise Refused `history_address`.
     """
     variable = environment.get(ENVIRONMENT)
-    if variable == SWITCHED_OFF or (section.is_off and not variable):
+    if variable == SWITCHED_OFF or section.is_off:
         return None
     return resolve_address(variable or section.url)
 
