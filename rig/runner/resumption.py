@@ -14,6 +14,19 @@ from rig.observation.sound_steps import sound_dwells, sound_sweeps
 from rig.plans.script_file import ScriptFile
 
 REMEDY = "Undo the change in config.yaml, or start a new run with `rig run`"
+JUDGED_BY = {  # settings by which a recording is solved and judged, with the key of the configuration
+    "limits": "limits",
+    "observation": "observation",
+    "uncertainty": "uncertainty",
+    "site": "site",
+    "to_calibrate": "sensors.….role",
+    "reference": "sensors.….turntable",
+    "matrix_corrected": "sensors.….correction",
+    "second_order": "procedure.second_order",
+    "finds_earth_rate": "procedure.earth_rate",
+    "reference_c": "procedure.reference_c",
+    "extension_m": "arm.extension_mm",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +65,8 @@ def resumption(earlier: Sequence[RunData], settings: RunSettings, script: Script
     """Return the valid steps of an interrupted run: dwells, and sweeps that a board, if there is one, has averaged too.
 
     A sweep that contradicts the others is not valid. Steps are identified by index, so script and movement must be the
-    same. Raise Refused `another_script`, `another_procedure`.
+    same. Settings that judge the recordings must be the same too, because those of the first recording hold for all.
+    Raise Refused `another_script`, `another_procedure`, `another_setting`.
     """
     for run in earlier:
         if run.provenance.script_sha256 != script.sha256:
@@ -66,6 +80,14 @@ def resumption(earlier: Sequence[RunData], settings: RunSettings, script: Script
                 "another_procedure",
                 "config.yaml in the run folder describes another procedure or home pose than the recording there",
                 REMEDY,
+            )
+        changed = [key for name, key in JUDGED_BY.items() if getattr(run.settings, name) != getattr(settings, name)]
+        if changed:
+            raise Refused(
+                "another_setting",
+                f"config.yaml in the run folder has other values than the recording there: {', '.join(changed)}; a run "
+                "is solved and judged by those with which it began",
+                f"{REMEDY}; a finished run is judged otherwise by `rig solve --set`",
             )
     sound = (
         sound_sweeps(run, settings.observation) & find_averaged_sweeps(run, settings.to_calibrate) for run in earlier

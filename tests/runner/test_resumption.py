@@ -14,6 +14,7 @@ from rig.analysis.gyroscope.calibration import observe_recordings
 from rig.data.recording.recorded_events import BoardObserved, TimedEvent
 from rig.data.recording.run_data import RunData
 from rig.data.recording.run_file import read_run
+from rig.errors import Refused
 from rig.observation.windows import swept
 from rig.plans.script_file import ScriptFile, find_installed_script
 from rig.runner.resumption import resumption
@@ -43,6 +44,17 @@ def known_to_the_board(run: RunData) -> RunData:
 def test_sweeps_that_agree_count() -> None:
     run = known_to_the_board(readings_of(SETUP).recording())
     assert resumption([run], run.settings, SCRIPT).done == set(range(6))
+
+
+def test_other_limits_than_those_of_the_recording_are_refused_by_name() -> None:
+    """The verdict is that of the first recording's limits: stricter ones in config.yaml would not be used."""
+    run = known_to_the_board(readings_of(SETUP).recording())
+    assert run.settings.limits is not None
+    stricter = run.settings.limits.model_copy(update={"scale_std": 1e-9})
+    site = replace(run.settings.site, gravity_m_s2=9.79)
+    with pytest.raises(Refused, match=r"another_setting: .*: limits, site;"):
+        resumption([run], replace(run.settings, limits=stricter, site=site), SCRIPT)
+    assert resumption([run], replace(run.settings, stage=1), SCRIPT).earlier
 
 
 @pytest.mark.thorough
