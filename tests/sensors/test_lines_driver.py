@@ -219,6 +219,15 @@ def test_what_is_wrong_with_it_has_a_name(chunks: Any, name: str) -> None:
     assert "sensors.imu" in str(refused.value)
 
 
+def test_a_time_in_another_unit_is_named_as_that() -> None:
+    with (
+        pty_printing(stream()) as (port, _),
+        pytest.raises(SensorError, match=r"lines_other_rate: .*set lines\.time\.unit to us"),
+        lines("imu", sensor_section(port, time={"unit": "ms", "wrap": 0}), Taken()),
+    ):
+        pass
+
+
 def test_arrival_times_are_recorded_as_less_certain() -> None:
     section = sensor_section("/dev/null", columns=SEVEN[1:], time=None, clock="arrival", jitter_ms=30)
     assert describe("imu", section).stamp_std_s == pytest.approx(0.03 / np.sqrt(3))

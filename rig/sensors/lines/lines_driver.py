@@ -27,6 +27,7 @@ MAX_UNPRINTABLE = 0.05  # fraction of bytes above which the baud rate is wrong
 MAX_REJECTED = 0.5  # fraction of lines above which a stream is useless
 MIN_REJECTED_LINES = 200  # for that
 RATE_TOLERANCE = 0.03
+TIME_UNITS = ("ns", "us", "ms", "s")
 STAMP_ROUNDING_STEPS = 2.0  # error of a time interval: one step of the time stamps at either end
 _CABLE = "Check its supply and cable, and whether another program has the port"
 
@@ -136,15 +137,30 @@ class LinesDevice:
         if not has_enough and not self.counts.samples:
             raise self._why_no_sample(timeout_s)
         rate_hz = self._measure_rate_hz()
-        if abs(rate_hz / self._rate_hz - 1) > max(RATE_TOLERANCE, self._rate_error):
+        if not self._is_stated(rate_hz):
             raise SensorError(
                 "lines_other_rate",
                 f"{self.where} sends {rate_hz:.4g} samples a second, but sensors.{self._sensor}.rate_hz is "
                 f"{self._rate_hz:g}",
-                "Set rate_hz to what it sends; if that is too little, its program prints for too long: raise the speed "
-                "of the line, or print less",
+                self._advise_on_rate(rate_hz),
             )
         return rate_hz
+
+    def _is_stated(self, rate_hz: float) -> bool:
+        """Return whether the rate is the stated one, as far as the times show it; true for NaN."""
+        return not abs(rate_hz / self._rate_hz - 1) > max(RATE_TOLERANCE, self._rate_error)
+
+    def _advise_on_rate(self, rate_hz: float) -> str:
+        """Return the remedy for samples at another rate: the times' unit, if in another one the rate is as stated."""
+        if self._section.time is not None:
+            size_s = UNITS[self._section.time.unit].size
+            for unit in TIME_UNITS:
+                if self._is_stated(rate_hz * size_s / UNITS[unit].size):
+                    return f"If its times are in {unit}, the rate is as stated: set lines.time.unit to {unit}"
+        return (
+            "Set rate_hz to what it sends; if that is too little, its program prints for too long: raise the speed of "
+            "the line, or print less"
+        )
 
     def _has_enough(self) -> bool:
         """Return whether the samples suffice to judge the rate. At a low rate few suffice; coarse times need more."""
