@@ -85,9 +85,10 @@ def resumption(earlier: Sequence[RunData], settings: RunSettings, script: Script
         if changed:
             raise Refused(
                 "another_setting",
-                f"config.yaml in the run folder has other values than the recording there: {', '.join(changed)}; a run "
-                "is solved and judged by those with which it began",
-                f"{REMEDY}; a finished run is judged otherwise by `rig solve --set`",
+                f"the configuration has other values than the recording: {', '.join(changed)}; a run is solved and "
+                "judged by those with which it began",
+                "Undo the change in the configuration, or start a new run with `rig run`; a finished run is judged "
+                "otherwise by `rig solve --set`",
             )
     sound = (
         sound_sweeps(run, settings.observation) & find_averaged_sweeps(run, settings.to_calibrate) for run in earlier
