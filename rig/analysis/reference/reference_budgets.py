@@ -1,6 +1,7 @@
 """The contributors to the uncertainty of accelerometers and magnetometers beyond their readings."""
 
 from dataclasses import replace
+from decimal import Decimal
 from typing import Final
 
 import numpy as np
@@ -27,6 +28,7 @@ from rig.estimation.reference.triaxial import TriaxialSolution
 
 # Half-width of gravity that is computed from latitude and height alone: anomalies by rocks and terrain, 50 mGal.
 LOCAL_GRAVITY_ERROR_M_S2: Final = 0.0005
+STANDARD_GRAVITIES_M_S2: Final = (STANDARD_GRAVITY_M_S2, 9.8, 9.81)
 STANDARD_GRAVITY_ERROR_M_S2: Final = 0.03  # 9.780 at the equator to 9.832 at the poles, less on mountains
 UNSTATED_FIELD_ERROR: Final = 0.01  # relative half-width: that of an ordinary fluxgate
 UNTESTED_DRIFT_T: Final = 1e-7  # change of the field in a run: a magnetic storm, a lift some floors away
@@ -121,8 +123,21 @@ def _gravity(site: Site) -> NormUncertainty:
     size, source = site.gravity_m_s2, "site.gravity_uncertainty_m_s2"
     if site.gravity_expanded_m_s2 is not None:
         return NormUncertainty("gravity", site.gravity_expanded_m_s2 / size, True, size, "m/s²", source)
-    half_width = STANDARD_GRAVITY_ERROR_M_S2 if size == STANDARD_GRAVITY_M_S2 else LOCAL_GRAVITY_ERROR_M_S2
-    return NormUncertainty("gravity", half_width / size, False, size, "m/s²", f"{source} {NOT_GIVEN_SUFFIX}")
+    return NormUncertainty(
+        "gravity", gravity_error_m_s2(size) / size, False, size, "m/s²", f"{source} {NOT_GIVEN_SUFFIX}"
+    )
+
+
+def gravity_error_m_s2(stated_m_s2: float) -> float:
+    """Return the half-width of a gravity that is stated without uncertainty.
+
+    It is half a unit of the last digit, and at least that of a computed gravity. The standard gravity, also as 9.8 or
+    9.81, says nothing about the place.
+    """
+    last_digit = 10.0 ** float(Decimal(repr(float(stated_m_s2))).as_tuple().exponent)
+    if stated_m_s2 in STANDARD_GRAVITIES_M_S2:
+        return STANDARD_GRAVITY_ERROR_M_S2
+    return max(last_digit / 2, LOCAL_GRAVITY_ERROR_M_S2)
 
 
 def _field(site: Site, field_t: float) -> NormUncertainty:

@@ -59,7 +59,7 @@ class SiteSection(Section):
         gt=0,
         le=0.1,
         description="expanded uncertainty (k = 2) of gravity_m_s2; if left out, a half-width of 0.0005 is used, "
-        "or of 0.03 if gravity_m_s2 is the standard value",
+        "or half a unit of its last digit if that is more, or 0.03 if gravity_m_s2 is the standard value, 9.8 or 9.81",
     )
     magnetic_field_ut: float | None = Field(
         default=None,

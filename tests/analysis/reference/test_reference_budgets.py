@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from rig.analysis.reference.datasheet_errors import Datasheet, read_datasheet
-from rig.analysis.reference.reference_budgets import accelerometer_budget, magnetometer_budget
+from rig.analysis.reference.reference_budgets import accelerometer_budget, gravity_error_m_s2, magnetometer_budget
 from rig.config.procedures.attitude_sets import OPTIMAL_ATTITUDES
 from rig.data.quantity import ACCELERATION
 from rig.data.recording.settings import Site
@@ -224,7 +224,7 @@ def test_the_size_of_the_reference_is_the_scale_s_alone(
 
 def test_an_unstated_value_is_assumed_and_reported() -> None:
     unstated = replace(SITE, gravity_expanded_m_s2=None, magnetic_field_expanded_t=None)
-    known, standard = accelerometer(0, unstated)[1], accelerometer(0, replace(unstated, gravity_m_s2=9.80665))[1]
+    known, standard = (accelerometer(0, replace(unstated, gravity_m_s2=stated))[1] for stated in (9.807, 9.80665))
     field = magnetometer(0, unstated)[1]
     lines = [
         next(contributor for contributor in found.contributors if contributor.kind == "B")
@@ -238,3 +238,14 @@ def test_without_sweeps_no_filter_lags() -> None:
     assert "filter's lag" in {line.name for line in accelerometer(0)[1].contributors}
     quick = accelerometer(0, lag_s=0.0)[1]
     assert quick.std_of("filter's lag").max() == 0
+
+
+@pytest.mark.parametrize(
+    ("stated_m_s2", "half_width_m_s2"),
+    [(9.80665, 0.03), (9.8, 0.03), (9.81, 0.03), (9.79, 0.005), (9.807, 0.0005), (9.80061, 0.0005)],
+)
+def test_a_gravity_without_uncertainty_is_believed_to_its_last_digit(
+    stated_m_s2: float, half_width_m_s2: float
+) -> None:
+    """A place with 9.80 m/s² that states 9.81 would have scale factors off by 0.1 %, many U."""
+    assert gravity_error_m_s2(stated_m_s2) == pytest.approx(half_width_m_s2)
