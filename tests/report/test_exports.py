@@ -9,22 +9,25 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from scipy.spatial.transform import Rotation
 
 from firmware_host.samples import IMU_SAMPLE_DTYPE
 from rig.cli import main
+from rig.data.entries.accelerometer import AlignmentEntry
 from rig.data.entries.magnetometer import MagnetometerEntry
-from rig.data.entries.result_types import ErrorEntry
+from rig.data.entries.result_types import ErrorEntry, PlacementEntry
 from rig.data.quantity import ACCELERATION
 from rig.data.recording.channel import triad_channel
 from rig.data.recording.run_file import read_run
 from rig.data.result_file import ResultDocument, VectorEntry, read_result
 from rig.errors import Refused
 from rig.estimation.arrays import Array
+from rig.estimation.sensor_axes import SensorAxes
 from rig.observation.observed_run import ObservedRun, observe_runs
 from rig.plans.recorded_run import open_run
 from rig.report.exports.autopilots import ardupilot_files, px4_files
 from rig.report.exports.columns import plain_names
-from rig.report.exports.exported_corrections import calibrations
+from rig.report.exports.exported_corrections import NOT_ALIGNED, calibrations
 from rig.report.exports.exported_recording import WithMotion, export_recordings
 from rig.report.exports.formats import CALIBRATION_FORMATS, FORMATS, texts_of_calibrations, writer_of_readings
 from rig.report.exports.imucal import imucal_files
@@ -47,7 +50,8 @@ def sensed() -> ResultDocument:
     vector = sensor.vector_model
     assert isinstance(vector, VectorEntry)
     changed = vector.model_copy(update={"g_sensitivity_rad_s_per_m_s2": rows(1e-3 * rng.normal(size=(3, 3)))})
-    beside = accelerometer(rows(np.eye(3) + 0.02 * rng.normal(size=(3, 3))))
+    aligned = AlignmentEntry(rotation_rad=(0.0, 0.0, 0.0), std_rad=(1e-4, 1e-4, 1e-4))
+    beside = accelerometer(rows(np.eye(3) + 0.02 * rng.normal(size=(3, 3)))).model_copy(update={"alignment": aligned})
     return result().model_copy(
         update={
             "gyroscopes": {"gyro": sensor.model_copy(update={"vector_model": changed})},
@@ -128,6 +132,41 @@ def test_kalibr_s_intrinsics_say_the_same_of_the_same_motion(sensed: ResultDocum
         scaled @ turned @ rate_body + sensitivity @ turned @ force_body, without_bias, rtol=1e-12, atol=1e-15
     )
     np.testing.assert_allclose(of_force @ force_body, acceleration - np.array(beside.bias_m_s2), rtol=1e-12, atol=1e-15)
+
+
+def test_an_accelerometer_that_a_file_of_attitudes_calibrated_is_turned_into_its_gyroscope_s_frame() -> None:
+    from imucal import CalibrationInfo
+
+    sensor = result().gyroscopes["gyro"]
+    assert isinstance(sensor.vector_model, VectorEntry)
+    to_gyroscope = np.array(sensor.vector_model.mounting)
+    turned = Rotation.from_euler("zyx", [90, 20, -5], degrees=True).as_matrix()  # another chip, soldered otherwise
+    skew = np.array([[1.02, 0.003, -0.002], [0.004, 0.98, 0.001], [-0.001, 0.003, 1.01]])
+    matrix = skew @ turned @ to_gyroscope
+    placement = PlacementEntry(
+        placement_std=None, placement_uncertainty=None, rests_without_attitude=0, rows_omitted=0, covariance=(),
+        covariance_order=(),
+    )  # fmt: skip
+    beside = accelerometer(rows(SensorAxes.from_matrix(matrix).correction_matrix))
+    beside = beside.model_copy(update={"matrix": rows(matrix), "placement": placement})
+    document = result().model_copy(update={"accelerometers": {"gyro": beside}})
+    rate, up = motion()
+    force = GRAVITY_M_S2 * up
+    read = np.array(beside.matrix) @ force + np.array(beside.bias_m_s2)
+    (imucal,) = imucal_files(calibrations(document)).values()
+    corrected, _ = CalibrationInfo.from_json(imucal).calibrate(read[None], np.zeros((1, 3)), "m/s^2", "rad/s")
+    np.testing.assert_allclose(corrected[0], to_gyroscope @ force, rtol=1e-9)
+    text = kalibr_files(calibrations(document))["gyro_intrinsics.yaml"]
+    imu = yaml.safe_load(text)["imu0"]
+    scaled, of_force = np.array(imu["gyroscopes"]["M"]), np.array(imu["accelerometers"]["M"])
+    # The frame of the accelerometer's triangular matrix is that in which C_gyro_i takes rates.
+    body = np.linalg.solve(of_force, np.array(beside.matrix))
+    without_bias = np.array(sensor.vector_model.matrix) @ rate
+    np.testing.assert_allclose(scaled @ np.array(imu["gyroscopes"]["C_gyro_i"]) @ body @ rate, without_bias, rtol=1e-9)
+    assert "not known: this file" not in text + imucal
+    unknown = document.model_copy(update={"accelerometers": {"gyro": accelerometer()}})
+    for files in (kalibr_files(calibrations(unknown)), imucal_files(calibrations(unknown))):
+        assert any(NOT_ALIGNED in text for text in files.values())
 
 
 def test_kalibr_s_noise_is_that_of_rests_over_the_root_of_the_rate(sensed: ResultDocument) -> None:

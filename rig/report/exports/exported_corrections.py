@@ -1,7 +1,7 @@
 """A run's calibrations for exports: corrections of all kinds, and gyroscopes paired with accelerometers as IMUs."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -15,13 +15,29 @@ from rig.estimation.arrays import Array
 from rig.report.findings.linear_corrections import SensorCorrection
 from rig.report.kinds.kind_registry import outlets, terms_of
 
+NOT_ALIGNED = "The rotation between gyroscope and accelerometer is not known: this file assumes parallel axes"
+
 
 @dataclass(frozen=True, slots=True)
 class Imu:
-    """A gyroscope with the accelerometer of the same sensor, if one was calibrated."""
+    """A gyroscope with the accelerometer of the same sensor, if one was calibrated.
+
+    The true values of both are in the gyroscope's frame; otherwise `remarks` has the sentence NOT_ALIGNED.
+    """
 
     gyroscope: SensorCorrection
     accelerometer: SensorCorrection | None
+    remarks: tuple[str, ...] = ()
+
+    @staticmethod
+    def pair(gyroscope: SensorCorrection, accelerometer: SensorCorrection | None) -> "Imu":
+        """Return the IMU, with the accelerometer's true values turned into the gyroscope's frame if possible."""
+        if accelerometer is None or accelerometer.in_gyroscope_frame:
+            return Imu(gyroscope, accelerometer)
+        if accelerometer.mounting is None or gyroscope.mounting is None:
+            return Imu(gyroscope, accelerometer, (NOT_ALIGNED,))
+        matrix = accelerometer.matrix @ accelerometer.mounting @ gyroscope.mounting.T
+        return Imu(gyroscope, replace(accelerometer, matrix=matrix, mounting=gyroscope.mounting))
 
     @property
     def name(self) -> str:
@@ -50,13 +66,13 @@ class ExportedCalibrations:
         gyroscopes = [triad for triad in self.sensors if triad.quantity == RATE]
         if not gyroscopes:
             raise Refused("nothing_to_export", "the run calibrated no gyroscope", "Give a run that calibrates one")
-        return tuple(Imu(gyroscope, accelerometers.get(gyroscope.sensor)) for gyroscope in gyroscopes)
+        return tuple(Imu.pair(gyroscope, accelerometers.get(gyroscope.sensor)) for gyroscope in gyroscopes)
 
     @property
     def not_in_imus(self) -> tuple[str, ...]:
         """The names of results that an IMU's file cannot hold: those of other sensors, and `further_terms`."""
-        parts = [triad for imu in self.imus for triad in (imu.gyroscope, imu.accelerometer)]
-        return (*(triad.name for triad in self.sensors if triad not in parts), *self.further_terms)
+        parts = {triad.name for imu in self.imus for triad in (imu.gyroscope, imu.accelerometer) if triad is not None}
+        return (*(triad.name for triad in self.sensors if triad.name not in parts), *self.further_terms)
 
     @property
     def further_terms(self) -> tuple[str, ...]:

@@ -47,6 +47,7 @@ def _convention(calibrations: ExportedCalibrations, imu: Imu) -> list[str]:
     ]
     if imu.accelerometer is None:
         sentences.append("No accelerometer was calibrated: K_a, R_a, b_a are those of an ideal one")
+    sentences += imu.remarks
     if imu.gyroscope.g_sensitivity is None:
         sentences.append("The g-sensitivity is not known: K_ga is zero")
     if imu.accelerometer is not None and imu.accelerometer.second_order:

@@ -76,6 +76,7 @@ def _intrinsics(calibrations: ExportedCalibrations, imu: Imu, topic: str) -> str
         comments.append(f"accelerometer: m = M a + b, b = {forces.offset.tolist()} m/s^2")
     if rates.g_sensitivity is None:
         comments.append("A is zero: the g-sensitivity is not known.")
+    comments += [f"{remark}." for remark in imu.remarks]
     comments.append("Lost: uncertainties, temperature, the accelerometer's second order and position.")
     comments += [f"Lost: {name}, for which there is no place" for name in calibrations.not_in_imus]
     return _yaml(comments, {"imu0": intrinsics})

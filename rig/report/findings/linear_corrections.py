@@ -45,6 +45,8 @@ class SensorCorrection:
     - `scale` (3,) is the factor of each axis that converts readings to true values, for programs without a matrix.
     - `g_sensitivity` (3, 3): a gyroscope's g-sensitivity, rad/s per m/s².
     - `second_order`: whether an accelerometer has quadratic terms, which no other program supports.
+    - `mounting` (3, 3): the rotation from the frame of the recorded motion to that of the true values, None if unknown.
+    - `in_gyroscope_frame`: whether an accelerometer's true values are in the frame of its gyroscope's.
     """
 
     sensor: str
@@ -59,6 +61,8 @@ class SensorCorrection:
     noise: ReadingNoise
     g_sensitivity: Array | None = None
     second_order: bool = False
+    mounting: Array | None = None
+    in_gyroscope_frame: bool = False
 
     @property
     def name(self) -> str:

@@ -88,7 +88,7 @@ def _build_correction(finding: Finding[GyroscopeEntry]) -> SensorCorrection | No
     sensor = finding.entry
     if finding.is_reference:
         return None
-    matrix, sensitivity = np.diag(1 / np.array(sensor.scale)), None
+    matrix, sensitivity, to_sensor = np.diag(1 / np.array(sensor.scale)), None, None
     if isinstance(vector := sensor.vector_model, VectorEntry):
         to_sensor = np.array(vector.mounting)
         matrix = np.array(vector.matrix) @ to_sensor.T
@@ -106,6 +106,7 @@ def _build_correction(finding: Finding[GyroscopeEntry]) -> SensorCorrection | No
         offset=-np.array(sensor.bias_rad_s),
         noise=noise_of(sensor.observations, [(rest.noise_rad_s, rest.samples) for rest in sensor.rests]),
         g_sensitivity=sensitivity,
+        mounting=to_sensor,
     )
 
 

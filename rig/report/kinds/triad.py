@@ -16,6 +16,7 @@ from rig.data.quantity import Quantity
 from rig.data.recording.layout_keys import NOT_STATED
 from rig.data.result_file import ResultDocument
 from rig.estimation.arrays import Array
+from rig.estimation.sensor_axes import SensorAxes
 from rig.report.findings.characteristic import Characteristic
 from rig.report.findings.characteristics import NON_ORTHOGONALITY
 from rig.report.findings.finding import Finding
@@ -130,6 +131,9 @@ def _build_correction(finding: Finding[Any]) -> SensorCorrection:
     """Return the correction of readings, in the right-angled frame of the entry's matrix."""
     quantity, entry = finding.quantity, finding.entry
     noise = [(getattr(dwell, quantity.file_key("noise")), dwell.samples) for dwell in entry.dwells]
+    to_sensor = None
+    if getattr(entry, "placement", None) is not None:  # only then `matrix` has the frame of a gyroscope's mounting
+        to_sensor = SensorAxes.from_matrix(np.array(entry.matrix)).mounting
     return SensorCorrection(
         sensor=finding.sensor,
         quantity=quantity,
@@ -142,6 +146,8 @@ def _build_correction(finding: Finding[Any]) -> SensorCorrection:
         offset=np.array(bias_of(quantity, entry)),
         noise=noise_of(entry.dwells, noise),
         second_order=getattr(entry, "second_order_s2_m", None) is not None,
+        mounting=to_sensor,
+        in_gyroscope_frame=getattr(entry, "alignment", None) is not None,
     )
 
 
