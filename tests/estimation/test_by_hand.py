@@ -296,6 +296,18 @@ def test_a_bias_that_jumps_for_good_ends_a_session_at_the_right_rest(after: int)
     assert f"ended at {session.rests[after + 1].start_s:.1f} s" in refusal.value.problem.what
 
 
+@pytest.mark.parametrize("program", ["whole degrees", "zeros for small rates"])
+def test_what_a_program_does_to_small_rates_widens_u_of_the_bias(program: str) -> None:
+    recorded, step = handle(SESSION, 3), float(np.radians(2))
+    coarse = {
+        "whole degrees": step / 2 * np.round(recorded.rates / (step / 2)),
+        "zeros for small rates": np.where(np.abs(recorded.rates) < step, 0.0, recorded.rates),
+    }
+    found = solved(replace(recorded, rates=coarse[program]))
+    assert (np.abs(found.scale - recorded.truth[:3]) < 1.3 * found.budget.expanded[:3]).all()
+    assert (np.abs(found.bias_rad_s - recorded.truth[3:]) < 1.5 * found.budget.expanded[3:]).all()
+
+
 def test_without_a_level_somebody_has_to_say_which_face_was_up() -> None:
     assert refused(handle(TWELVE, 2), level=False, told=replace(TOLD, first_face=None)) == "first_face_unknown"
 

@@ -53,6 +53,7 @@ TREMOR_BANDWIDTH_HZ, QUIET_SCATTER_RATIO = 4.0, 1.5
 MOVE, REST, WALK, FLAT, CLOSURE, TILT, ACCELERATION, PRIOR = (
     "move", "rest", "walk", "flat", "closure", "lean", "acceleration", "prior",
 )  # fmt: skip
+ROUNDING = "rounding"  # a cause of errors
 
 
 @dataclass(frozen=True, slots=True)
@@ -309,6 +310,8 @@ def _rest(graph: Graph, row: int) -> Factor:
         "noise": np.full(3, graph.walk_rad_sqrt_s / np.sqrt(max(rest.end_s - rest.start_s, 1e-3))),
         "earth": np.full(3, EARTH_STD_RAD_S),
         "held": np.full(3, _hand_held_std(rest.noise_rad_s, graph.noise_rad_s, rest.end_s - rest.start_s)),
+        # One error common to all rests; the factors count as independent.
+        ROUNDING: np.broadcast_to(rest.rounding_rad_s, 3) * np.sqrt(len(session.rests)),
     }
     return Factor(REST, row, rest.mean_rad_s - state.biases[row] - state.sensitivity @ up, design, causes)
 

@@ -20,6 +20,7 @@ class HandRest:
 
     `mean_rad_s` and `noise_rad_s` (3,) are the readings' mean and standard deviation. `acceleration_m_s2` and
     `acceleration_noise_m_s2` (3,) are those of an accelerometer's readings, None without an accelerometer.
+    `rounding_rad_s` (3,): standard uncertainty of the mean due to coarse readings, the same error in every rest.
     """
 
     start_s: float
@@ -29,6 +30,7 @@ class HandRest:
     noise_rad_s: Array
     acceleration_m_s2: Array | None = None
     acceleration_noise_m_s2: Array | None = None
+    rounding_rad_s: Array | float = 0.0
 
     @property
     def middle_s(self) -> float:

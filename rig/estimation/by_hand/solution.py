@@ -13,7 +13,7 @@ from rig.estimation.arrays import Array, scale_of
 from rig.estimation.by_hand.creep import find_creeping_rests
 from rig.estimation.by_hand.fit import PRIOR_DOF, GraphFit, fit_session, whiten_rows
 from rig.estimation.by_hand.flip_axes import check_axes
-from rig.estimation.by_hand.graph import CLOSURE, MOVE, Factor
+from rig.estimation.by_hand.graph import CLOSURE, MOVE, ROUNDING, Factor
 from rig.estimation.by_hand.session_outliers import find_contradiction, find_masked_fault
 from rig.estimation.by_hand.session_parts import FACES, MAX_STDS, STATED, HandRecording, SessionConditions, drop_rests
 from rig.estimation.gyroscope.budget import Budget, Contributor
@@ -38,6 +38,7 @@ CONTRIBUTORS: dict[str, tuple[Literal["A", "B"], tuple[str, ...], str]] = {
         ("walk", "earth", "bias", "drift", "jump"),
         "scatter of the rests; the Earth's rate",
     ),
+    ROUNDING: ("B", (ROUNDING,), "the steps of the readings, at rest"),
     "angles of the moves": ("A", ("of_angle",), "how the moves contradict each other"),
     "nonlinearity": ("B", ("nonlinearity", "matrix"), "what is known of parts, and the moves this way and that"),
     "g-sensitivity": ("B", ("g-sensitivity",), "what is known of parts, and the rests on opposite faces"),
@@ -295,6 +296,7 @@ def _budget(fit: GraphFit, to_parameters: Array, clock: Array) -> Budget:
     lines = [
         Contributor(name, kind, "normal", None, "", source, dof.get(name, np.inf), covariances[name])
         for name, (kind, _, source) in CONTRIBUTORS.items()
+        if name != ROUNDING or covariances[name].any()
     ]
     ppm, source = fit.conditions.clock_ppm, fit.conditions.clock_source
     lines.append(Contributor(CLOCK, "B", "rectangular", ppm, "ppm", source, np.inf, clock))

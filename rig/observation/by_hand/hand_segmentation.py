@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from rig.data.quantity import RATE
 from rig.estimation.arrays import Array, equal_runs
 from rig.estimation.by_hand.session_parts import HandRecording, HandRest, Move
+from rig.estimation.statistics.rounding import Steps, bound_rounding_variance, find_steps
 from rig.observation.by_hand.rests import ROUNDING_TOLERANCE, find_rests
 from rig.observation.time_stamps.gaps import find_hiding_gaps
 from rig.observation.time_stamps.sampling import find_sampling
@@ -22,6 +23,8 @@ from rig.observation.windows import Window
 MARGIN_S = 0.1  # time at either end of a rest that is assigned to the adjacent moves
 MIN_GAP_READINGS = 2  # fewest missing readings that count as a gap
 MIN_SATURATED = 3  # equal readings in a row at the largest value
+ONE_STEP = 1.5  # steps of coarse readings, between one and two
+MIN_CLIPPED_FRACTION = 0.8  # of readings at the end of a range among those within a step of it; a parabola has 0.71
 SATURATION_FRACTION = 0.995
 BEGINNING_S, MAX_STILL_SCATTER_RAD_S = 1.0, 0.03  # of a recording, and the scatter there without a hand
 MIN_REST_S, EVALUATION_S = 1.0, 0.25  # during a session; interval of the evaluations
@@ -37,8 +40,9 @@ def segment_session(
     `range_rad_s` is the gyroscope's range, None if unknown.
     """
     windows = find_rests(time_s, {RATE: rates}, still_at_first=_began_still(time_s, rates)) if len(time_s) > 1 else ()
-    rests = tuple(_rest(time_s, rates, acceleration, window) for window in windows)
-    top = _find_clipped(rates, range_rad_s)
+    steps = Steps(find_steps(rates))
+    rests = tuple(_rest(time_s, rates, acceleration, window, steps) for window in windows)
+    top = _find_clipped(rates, range_rad_s, steps)
     gaps = _find_gaps(time_s, rates)
     moves = []
     for first, second in pairwise(windows):
@@ -68,7 +72,7 @@ def _margin_s(window: Window) -> float:
     return min(MARGIN_S, (window.end_s - window.start_s) / 4)
 
 
-def _rest(time_s: Array, rates: Array, acceleration: Array | None, window: Window) -> HandRest:
+def _rest(time_s: Array, rates: Array, acceleration: Array | None, window: Window, steps: Steps) -> HandRest:
     """Return the rest in a window: means and standard deviations, for which a margin at either end is left out."""
     start_s, end_s = window.start_s + _margin_s(window), window.end_s - _margin_s(window)
     inside = (time_s >= start_s) & (time_s <= end_s)
@@ -81,22 +85,41 @@ def _rest(time_s: Array, rates: Array, acceleration: Array | None, window: Windo
         rates[inside].std(axis=0, ddof=1),
         None if forces is None else forces.mean(axis=0),
         None if forces is None else forces.std(axis=0, ddof=1),
+        _find_rounding_std(rates, rates[inside], steps),
     )
 
 
-def _find_clipped(rates: Array, range_rad_s: float | None) -> NDArray[np.bool_]:
+def _find_rounding_std(rates: Array, at_rest: Array, steps: Steps) -> Array:
+    """Return the standard uncertainty (3,) that coarse readings cause in the mean of those `at_rest` (k, 3).
+
+    If an axis repeats one value, it may have read anything nearer to this value than to any other reading (n, 3) of the
+    session, or, if its program cuts digits or writes zeros for small rates, anything up to that reading.
+    """
+    variances = bound_rounding_variance(at_rest, steps, np.zeros_like(at_rest), at_rest.var(axis=0))
+    for axis in np.flatnonzero(np.ptp(at_rest, axis=0) == 0):
+        distances = np.abs(rates[:, axis] - at_rest[0, axis])
+        variances[axis] = np.min(distances, where=distances > 0, initial=np.inf) ** 2 / 3
+    return np.sqrt(np.where(np.isfinite(variances), variances, 0.0))
+
+
+def _find_clipped(rates: Array, range_rad_s: float | None, steps: Steps) -> NDArray[np.bool_]:
     """Return a mask (n,) of the readings that are at the limit of the range.
 
-    If the range is unknown, long series of equal readings count as clipped.
+    If the range is unknown, long series of equal readings count as clipped. Coarse readings of a rate that passes its
+    maximum repeat the largest value too, but then the next smaller value at least half as often before and after it.
     """
     if range_rad_s is not None:
         return np.asarray((np.abs(rates) >= SATURATION_FRACTION * range_rad_s).any(axis=1))
-    size = np.abs(rates)
-    same = ((size >= size.max(axis=0) * (1 - 1e-9)) & (size > 0)).astype(np.intp)
-    ahead = np.cumsum(np.vstack([np.zeros((1, 3), np.intp), same]), axis=0)
     top = np.zeros(len(rates), dtype=np.bool_)
-    for first in np.flatnonzero((ahead[MIN_SATURATED:] - ahead[:-MIN_SATURATED] == MIN_SATURATED).any(axis=1)):
-        top[first : first + MIN_SATURATED] = True
+    for axis, unit in enumerate(steps.units):
+        size = np.abs(rates[:, axis])
+        largest = (size >= size.max() * (1 - 1e-9)) & (size > 0)
+        near = largest | (size >= size.max() - ONE_STEP * unit)
+        runs = equal_runs(near)
+        for first, end in runs[near[runs[:, 0]]].tolist():
+            count = int(np.count_nonzero(largest[first:end]))
+            if count >= max(MIN_SATURATED, MIN_CLIPPED_FRACTION * (end - first)):
+                top[first:end] |= largest[first:end]
     return top
 
 

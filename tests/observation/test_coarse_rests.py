@@ -1,0 +1,49 @@
+"""Rests and moves by hand in coarse readings: what their steps hide, and a maximum that is no end of a range."""
+
+import numpy as np
+import pytest
+
+from rig.estimation.arrays import Array
+from rig.observation.by_hand.hand_segmentation import segment_session
+
+STEP = float(np.radians(1))
+BIAS = np.radians([0.4, -0.3, 0.2])
+
+
+def read() -> tuple[Array, Array]:
+    """Times and rates of three rests and two moves by a hand, with noise of a tenth of a degree a second."""
+    time_s = np.arange(1600) / 200
+    push = np.interp(time_s, [1.5, 2.1, 2.7, 4.5, 5.3, 6.1], [0.0, 2.3, 0.0, 0.0, -1.9, 0.0])
+    smooth = np.sin(np.pi / 2 * push / 2.5)
+    rates = smooth[:, None] * [1.0, 0.4, -0.3]
+    return time_s, rates + BIAS + np.radians(0.1) * np.random.default_rng(1).normal(size=rates.shape)
+
+
+def test_fine_readings_hide_nothing() -> None:
+    session = segment_session(*read())
+    assert len(session.rests) == 3
+    assert all(not np.any(rest.rounding_rad_s) for rest in session.rests)
+
+
+@pytest.mark.parametrize("how", ["rounded", "cut"])
+def test_whole_degrees_hide_a_part_of_the_bias_and_end_at_no_range(how: str) -> None:
+    time_s, rates = read()
+    coarse = STEP * (np.round(rates / STEP) if how == "rounded" else np.trunc(rates / STEP))
+    session = segment_session(time_s, coarse)
+    assert len(session.rests) == 3 and not any(move.clipped for move in session.moves)
+    for rest in session.rests:
+        assert (np.abs(rest.mean_rad_s - BIAS) < 2 * np.asarray(rest.rounding_rad_s)).all()
+
+
+def test_zeros_in_place_of_small_rates_hide_what_is_smaller_than_the_other_readings() -> None:
+    time_s, rates = read()
+    limit = np.radians(2)
+    session = segment_session(time_s, np.where(np.abs(rates) < limit, 0.0, rates))
+    for rest in session.rests:
+        np.testing.assert_allclose(rest.rounding_rad_s, limit / np.sqrt(3), rtol=0.2)
+
+
+def test_a_range_that_ends_is_seen_in_coarse_readings_too() -> None:
+    time_s, rates = read()
+    session = segment_session(time_s, STEP * np.round(np.clip(rates, -0.6, 0.6) / STEP))
+    assert session.moves[0].clipped and session.moves[1].clipped
