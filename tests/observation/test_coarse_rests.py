@@ -43,7 +43,11 @@ def test_zeros_in_place_of_small_rates_hide_what_is_smaller_than_the_other_readi
         np.testing.assert_allclose(rest.rounding_rad_s, limit / np.sqrt(3), rtol=0.2)
 
 
-def test_a_range_that_ends_is_seen_in_coarse_readings_too() -> None:
+@pytest.mark.parametrize("range_rad_s", [None, 4.0])
+def test_a_range_that_ends_is_seen_in_coarse_readings_too_and_where_a_wider_one_is_stated(
+    range_rad_s: float | None,
+) -> None:
     time_s, rates = read()
-    session = segment_session(time_s, STEP * np.round(np.clip(rates, -0.6, 0.6) / STEP))
+    clipped = STEP * np.round(np.clip(rates, -0.6, 0.6) / STEP)
+    session = segment_session(time_s, clipped, range_rad_s=range_rad_s)
     assert session.moves[0].clipped and session.moves[1].clipped

@@ -105,12 +105,12 @@ def _find_rounding_std(rates: Array, at_rest: Array, steps: Steps) -> Array:
 def _find_clipped(rates: Array, range_rad_s: float | None, steps: Steps) -> NDArray[np.bool_]:
     """Return a mask (n,) of the readings that are at the limit of the range.
 
-    If the range is unknown, long series of equal readings count as clipped. Coarse readings of a rate that passes its
-    maximum repeat the largest value too, but then the next smaller value at least half as often before and after it.
+    The device may have a smaller range than `range_rad_s`, so long series of the largest reading count as clipped too.
+    Coarse readings of a rate that passes its maximum repeat the largest value as well, but then also the next smaller
+    one, at least half as often.
     """
-    if range_rad_s is not None:
-        return np.asarray((np.abs(rates) >= SATURATION_FRACTION * range_rad_s).any(axis=1))
-    top = np.zeros(len(rates), dtype=np.bool_)
+    limit = np.inf if range_rad_s is None else SATURATION_FRACTION * range_rad_s
+    top = (np.abs(rates) >= limit).any(axis=1)
     for axis, unit in enumerate(steps.units):
         size = np.abs(rates[:, axis])
         largest = (size >= size.max() * (1 - 1e-9)) & (size > 0)
