@@ -306,6 +306,20 @@ def restarted(wire: KvhOnAWire) -> None:
 
 
 @pytest.mark.slow
+def test_a_restart_is_named_where_the_built_in_test_comes_between_two_messages() -> None:
+    with kvh_on_a_wire({"DR": "10"}) as wire, streaming(wire, rate_hz=10, message="A") as (source, collected):
+        collected.wait(source, 2)
+
+        def power_dip(_: object) -> None:
+            wire.switch_on()
+            assert wire.kvh is not None
+            wire.kvh.misbehave(lose=1000)  # so the test comes alone
+
+        wire.order(power_dip)
+        assert wait_for_error(SensorError, source.check).name == "kvh_restarted"
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("happens", "name"),
     [

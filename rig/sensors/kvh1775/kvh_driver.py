@@ -196,7 +196,7 @@ class Kvh1775:
             self._tests += decoded.tests
             counter = self._counter
             self.own_port.news.notify_all()
-        if counter is None or not len(decoded.messages):
+        if counter is None:
             return
         if decoded.tests:
             raise SensorError(
@@ -204,6 +204,8 @@ class Kvh1775:
                 f"{self._where} reported its built-in test while it streamed: it was switched off and on",
                 "Check its supply, then run again",
             )
+        if not len(decoded.messages):
+            return
         if (decoded.messages["format"] != self._format).any():
             raise SensorError(
                 "kvh_other_format",
