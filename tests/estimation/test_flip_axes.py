@@ -43,6 +43,14 @@ def test_swapped_and_mirrored_columns_are_named(order: tuple[int, ...], signs: t
         check(replace(handled(), rates=handled().rates[:, order] * signs))
 
 
+def test_inverted_readings_are_named_by_moves_that_were_refused_because_of_them() -> None:
+    recorded = handled()
+    session = segment_session(recorded.time_s, -recorded.rates, recorded.acceleration)
+    refused = tuple(replace(move, left_out=True) for move in session.moves)
+    with pytest.raises(Fault, match=r"mirrored_axis.*-x, -y, -z"):
+        check_axes(replace(session, moves=refused))
+
+
 @pytest.mark.parametrize("angle_deg", [80, 90])
 def test_axes_that_no_order_explains_are_not_called_swapped(angle_deg: float) -> None:
     with pytest.raises(Fault, match=r"wrong_mounting: the gyroscope's axes lie (79|80|89|90)° off"):

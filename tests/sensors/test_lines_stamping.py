@@ -52,6 +52,26 @@ def test_a_sequence_counts_them_whatever_the_time_does(wrap: int) -> None:
     assert np.array_equal(numbers, kept) and stamper.lost == 28
 
 
+@pytest.mark.parametrize(
+    ("columns", "step", "wrap", "remedy"),
+    [
+        (FOUR, 10_000, 2**30, "set lines.time.wrap to 1073741824"),
+        (("sequence", "gx", "gy", "gz"), 1, 65536, "set lines.sequence_wrap to 65536"),
+        (("sequence", "gx", "gy", "gz"), 1, 10_000, "set lines.sequence_wrap to 10000"),
+        (FOUR, 10_000, 7 * 10**8, "Check its supply"),
+    ],
+)
+def test_a_counter_that_starts_again_where_no_key_says_so_names_the_key(
+    columns: tuple[str, ...], step: int, wrap: int, remedy: str
+) -> None:
+    printed = (wrap - 50 * step + step * np.arange(100)) % wrap
+    keys: dict[str, Any] = {"columns": columns} | ({} if columns == FOUR else {"time": None, "clock": "counted"})
+    with pytest.raises(SensorError) as caught:
+        stamped(rows(printed.astype(float)), **keys)
+    assert caught.value.name == "lines_time_jumped" and remedy in str(caught.value)
+    assert ("starts again" in str(caught.value)) == remedy.startswith("set")
+
+
 def test_one_time_that_cannot_be_is_damage_three_are_a_restart() -> None:
     printed = np.arange(100) * 10_000.0 + 5e7
     printed[50] += 9e8

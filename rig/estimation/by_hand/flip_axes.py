@@ -1,5 +1,7 @@
 """The comparison of the gyroscope's axes with the accelerometer's, by the axes about which flips turn the body."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from rig.errors import Fault
@@ -28,7 +30,15 @@ def check_axes(session: HandRecording) -> None:
         raise Fault("wrong_unit", "the readings look like degrees per second given as rad/s", "Give them in rad/s")
     if session.acceleration is None:
         return
-    about, swept = _quarters(session)
+    usable = [row for row, move in enumerate(session.moves) if move.is_usable]
+    measured = [row for row, move in enumerate(session.moves) if not (move.lost or move.clipped)]
+    # Moves that were refused because they contradict the others show wrong axes too, if they agree with each other.
+    for rows in (usable, measured):
+        _check_quarters(*_quarters(session, rows))
+
+
+def _check_quarters(about: Array, swept: Array) -> None:
+    """Raise Fault as `check_axes` does, if quarter turns `about` axes (k, 3) explain what was `swept` (k, 3)."""
     if len(about) < MIN_FLIPS or np.linalg.svd(about)[1][-1] < 0.5:
         return
     matrix = np.linalg.lstsq(about, swept, rcond=None)[0].T  # swept = M about
@@ -66,13 +76,13 @@ def _check_turned(unit: Array) -> None:
         )
 
 
-def _quarters(session: HandRecording) -> tuple[Array, Array]:
-    """Return the rotation vectors of k quarter turns: (k, 3) by the accelerometer, and (k, 3) by the gyroscope."""
+def _quarters(session: HandRecording, rows: Sequence[int]) -> tuple[Array, Array]:
+    """Return the rotation vectors of k quarter turns among the moves `rows`, by accelerometer and by gyroscope."""
     about = []
     swept = []
-    for row, move in enumerate(session.moves):
-        first, second = session.rests[row], session.rests[row + 1]
-        if not move.is_usable or first.acceleration_m_s2 is None or second.acceleration_m_s2 is None:
+    for row in rows:
+        move, first, second = session.moves[row], session.rests[row], session.rests[row + 1]
+        if first.acceleration_m_s2 is None or second.acceleration_m_s2 is None:
             continue
         start, end = (mean / np.linalg.norm(mean) for mean in (first.acceleration_m_s2, second.acceleration_m_s2))
         if abs(start @ end) > MAX_FLIP_COSINE:

@@ -110,7 +110,7 @@ def _find_clipped(rates: Array, range_rad_s: float | None, steps: Steps) -> NDAr
     one, at least half as often.
     """
     limit = np.inf if range_rad_s is None else SATURATION_FRACTION * range_rad_s
-    top = (np.abs(rates) >= limit).any(axis=1)
+    top: NDArray[np.bool_] = np.any(np.abs(rates) >= limit, axis=1)
     for axis, unit in enumerate(steps.units):
         size = np.abs(rates[:, axis])
         largest = (size >= size.max() * (1 - 1e-9)) & (size > 0)

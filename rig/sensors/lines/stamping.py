@@ -2,7 +2,7 @@
 
 from copy import copy
 from dataclasses import dataclass, field
-from math import exp
+from math import ceil, exp, log
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ MAX_ODD_SAMPLES = 3  # in a row with an impossible time: fewer are damaged, as m
 COARSE_STEP_FRACTION = 0.2  # of the sample interval: a time with coarser steps is smoothed
 SMOOTHING_S = 2.0  # time constant, of arrival times and coarse ones
 MAX_ARRIVAL_DELAY_S = 0.1  # of a line: above it, one counts as lost
+ROUND_OFF = 1e-12  # of a logarithm
 _RESTARTED = "Check its supply and cable, and that its program prints nothing else between; then run again"
 
 
@@ -143,7 +144,7 @@ class Stamper:
                 self.odd += 1
                 self._odd_in_a_row += 1
                 if self._odd_in_a_row >= MAX_ODD_SAMPLES:
-                    raise SensorError("lines_time_jumped", f"{self.where}: {self._jump(row)}", _RESTARTED)
+                    raise SensorError("lines_time_jumped", f"{self.where}: {self._jump(row)}", self._remedy(row))
         finally:
             self._last_time, self._last_sequence = last
         return is_sample
@@ -184,6 +185,20 @@ class Stamper:
             if name in columns and before is not None
         ]
         return " and ".join(changes) + ": the device was restarted, or more than 2 s of its lines are lost"
+
+    def _remedy(self, row: Array) -> str:
+        """Return what to do about a jump: state the counter's wrap if it was probably one, at a power of two or ten."""
+        columns, time = self.section.columns, self.section.time
+        one_s = {"sequence": self.rate_hz, "time": 1.0 / UNITS[time.unit].size if time is not None else 0.0}
+        stated = {"sequence": self.section.sequence_wrap, "time": 0.0 if time is None else time.wrap}
+        keys = {"sequence": "lines.sequence_wrap", "time": "lines.time.wrap"}
+        for name, before in (("time", self._last_time), ("sequence", self._last_sequence)):
+            if name not in columns or before is None or not 1 < row[columns.index(name)] + 1 <= before:
+                continue
+            for wrap in (base ** ceil(log(before + 1, base) - ROUND_OFF) for base in (2.0, 10.0)):
+                if wrap != stated[name] and wrap - before + row[columns.index(name)] <= MAX_GAP_S * one_s[name]:
+                    return f"If its {name} starts again at {wrap:.15g}, set {keys[name]} to {wrap:.15g}. {_RESTARTED}"
+        return _RESTARTED
 
     # -- times ---------------------------------------------------------------------------------------------------
     def _add_late(self, steps: NDArray[np.int64], host_time_s: float) -> NDArray[np.int64]:
