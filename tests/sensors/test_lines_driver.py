@@ -69,6 +69,16 @@ def test_samples_come_in_si_units_and_boot_text_is_no_sample() -> None:
 
 
 @pytest.mark.slow
+def test_a_device_that_prints_every_line_twice_has_each_sample_once() -> None:
+    taken, twice = Taken(), (line for line in stream() for _ in range(2))
+    with pty_printing(twice) as (port, _), lines("imu", sensor_section(port), taken) as source:
+        source.start()
+        samples = taken.wait(source, 50)
+    assert (np.diff(samples["sequence"].astype(int)) == 1).all()
+    assert (np.diff(samples["board_time_us"].astype(int)) == 10_000).all()
+
+
+@pytest.mark.slow
 def test_columns_without_axes_are_sensors_of_their_own_on_the_same_clock() -> None:
     columns = (*SEVEN[:4], "air", "room", "-")
     scalars = {"air": {"unit": "hPa", "scale": 100}, "room": {"unit": "K", "scale": 1000}}

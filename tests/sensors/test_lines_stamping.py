@@ -59,6 +59,7 @@ def test_a_sequence_counts_them_whatever_the_time_does(wrap: int) -> None:
         (("sequence", "gx", "gy", "gz"), 1, 65536, "set lines.sequence_wrap to 65536"),
         (("sequence", "gx", "gy", "gz"), 1, 10_000, "set lines.sequence_wrap to 10000"),
         (FOUR, 10_000, 7 * 10**8, "Check its supply"),
+        (FOUR, 10_000, 2**30 - 10**5, "Check its supply"),  # a restart shortly before
     ],
 )
 def test_a_counter_that_starts_again_where_no_key_says_so_names_the_key(

@@ -13,6 +13,7 @@ from rig.data.recording.recorded_sensor import UNKNOWN_CHANGE_K
 from rig.estimation.earth import STANDARD_GRAVITY_M_S2
 from rig.sensors.errors import SensorError
 from rig.sensors.mavlink.autopilot_source import MavlinkSource, look, mavlink
+from rig.sensors.mavlink.dialect import dialect
 from support.processes.waiting import wait_for, wait_for_error
 from support.wires.autopilot_on_a_wire import BIAS_RAD_S, UID, AutopilotOnAWire, autopilot_on_a_wire, section
 
@@ -195,6 +196,23 @@ def test_an_autopilot_that_arms_while_it_streams_ends_it() -> None:
         assert wire.autopilot is not None
         wire.autopilot.armed = True
         assert wait_for_error(SensorError, heard.source.check).problem.name == "autopilot_armed"
+
+
+@pytest.mark.parametrize(("name", "ends"), [("INS_GYROFFS_Y", True), ("INS_GYR_CAL", False)])
+def test_a_parameter_of_the_readings_that_another_program_changes_ends_a_stream(name: str, ends: bool) -> None:
+    with autopilot_on_a_wire("ardupilot") as wire, Listening({"imu": section(wire.port)}) as heard:
+        heard.hear(20)
+        autopilot = wire.autopilot
+        assert autopilot is not None
+        mavlink2 = dialect()
+        sender = mavlink2.MAVLink(None, srcSystem=254)
+        change = mavlink2.MAVLink_param_set_message(1, 1, name.encode(), 0.5, 9).pack(sender)
+        wire.wire.order(lambda: autopilot.receive(change))
+        if ends:
+            error = wait_for_error(SensorError, heard.source.check)
+            assert error.name == "autopilot_parameter_changed" and f"{name} changed from 0 to 0.5" in str(error)
+        else:
+            heard.hear(60)
 
 
 def test_a_look_says_what_is_undone() -> None:

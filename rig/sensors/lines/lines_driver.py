@@ -194,10 +194,14 @@ class LinesDevice:
         time_section = self._section.time
         if time_section is None or self.counts.samples < 5:
             return float("nan")
-        span_s, count, step_s = self._span_s(), len(self.first_values) - 1, self.time_step_s
+        span_s, step_s = self._span_s(), self.time_step_s
         unit_s = UNITS[time_section.unit].size
         printed = self.first_values[:, self._section.columns.index("time")]
-        typical_s = float(np.median(np.diff(printed))) * unit_s
+        steps = np.diff(printed)
+        if not is_coarse(step_s, self._rate_hz):
+            steps = steps[steps != 0]  # a line that is printed twice is one sample
+        count = len(steps)
+        typical_s = float(np.median(steps)) * unit_s if count else 0.0
         if span_s <= 0:
             raise SensorError(
                 "lines_time_stands",

@@ -189,14 +189,17 @@ class Stamper:
     def _remedy(self, row: Array) -> str:
         """Return what to do about a jump: state the counter's wrap if it was probably one, at a power of two or ten."""
         columns, time = self.section.columns, self.section.time
-        one_s = {"sequence": self.rate_hz, "time": 1.0 / UNITS[time.unit].size if time is not None else 0.0}
+        interval = {"sequence": 1.0, "time": 1.0 / UNITS[time.unit].size / self.rate_hz if time is not None else 0.0}
         stated = {"sequence": self.section.sequence_wrap, "time": 0.0 if time is None else time.wrap}
         keys = {"sequence": "lines.sequence_wrap", "time": "lines.time.wrap"}
         for name, before in (("time", self._last_time), ("sequence", self._last_sequence)):
             if name not in columns or before is None or not 1 < row[columns.index(name)] + 1 <= before:
                 continue
             for wrap in (base ** ceil(log(before + 1, base) - ROUND_OFF) for base in (2.0, 10.0)):
-                if wrap != stated[name] and wrap - before + row[columns.index(name)] <= MAX_GAP_S * one_s[name]:
+                if (
+                    wrap != stated[name]
+                    and wrap - before + row[columns.index(name)] <= 2 * MAX_ODD_SAMPLES * interval[name]
+                ):
                     return f"If its {name} starts again at {wrap:.15g}, set {keys[name]} to {wrap:.15g}. {_RESTARTED}"
         return _RESTARTED
 

@@ -75,6 +75,7 @@ class AutopilotLink:
         self.armed = False
         self._byte_count = self._other_count = 0
         self._parameters: dict[str, AutopilotParameter] = {}
+        self._used: dict[str, AutopilotParameter] = {}  # by which the stream's readings are interpreted
         self._answers: dict[int, int] = {}
         self._version: Any = None
         self._sending = threading.Lock()
@@ -122,6 +123,12 @@ class AutopilotLink:
                 "Check the line to its receiver (RX), and that the port is not one that only sends",
             )
         return parameters
+
+    def stream(self) -> None:
+        """Begin to expect readings. From now on a change of a parameter that was requested is an error."""
+        with self.own_port.news:
+            self._used = dict(self._parameters)
+            self.own_port.stream()
 
     def set_parameter(self, parameter: AutopilotParameter) -> AutopilotParameter:
         """Set a parameter to its four bytes and return the answer. Raise SensorError `autopilot_not_set`."""
@@ -267,6 +274,17 @@ class AutopilotLink:
             with self.own_port.news:
                 self.own_port.news.notify_all()
 
+    def _refuse_change(self, parameter: AutopilotParameter) -> None:
+        """Raise SensorError `autopilot_parameter_changed` if readings were interpreted by another value."""
+        used = self._used.get(parameter.name, parameter)
+        if used.field != parameter.field:
+            raise SensorError(
+                "autopilot_parameter_changed",
+                f"{self._where}: while it streamed, its parameter {parameter.name} changed from {used.value:g} to "
+                f"{parameter.value:g}",
+                "Close every ground station and program that talks to the autopilot, then run again",
+            )
+
     def _is_from_autopilot(self, message: Any) -> bool:
         """Return whether a message came from the selected autopilot, which is the first one with a heartbeat."""
         source = (message.get_srcSystem(), message.get_srcComponent())
@@ -286,6 +304,7 @@ class AutopilotLink:
                 name = message.param_id
                 field = extract_value(bytes(message.get_msgbuf()))
                 self._parameters[name] = AutopilotParameter(name, message.param_type, field, self.identity.firmware)
+                self._refuse_change(self._parameters[name])
             case "COMMAND_ACK":
                 self._answers[message.command] = message.result
             case "AUTOPILOT_VERSION":

@@ -149,10 +149,13 @@ class MavlinkSource:
 
     def start(self) -> None:
         """Start to pass samples to the consumer."""
-        self.link.own_port.stream()
+        self.link.stream()
 
     def check(self, clock_s: float | None = None) -> None:
-        """Raise an error that has occurred since the last call: as `OwnPort.check` does, or `autopilot_armed`."""
+        """Raise an error that has occurred since the last call.
+
+        It is one of `OwnPort.check`, `autopilot_armed` or `autopilot_parameter_changed`.
+        """
         self.link.own_port.check(clock_s)
 
     def catch_up(self) -> None:
