@@ -186,8 +186,8 @@ class VectorEntry(Entry):
     """The vector model's solution: the six parameters, and the directions of the three axes.
 
     - residuals_std_rad_s: expected standard deviation of each residual.
-    - …_degrees_of_freedom: of the standard deviations of that name, null if infinite.
-    - Both are absent without a budget, as for sweeps of a file.
+    - …_degrees_of_freedom: those of the standard deviations with the same beginning of the name, null if infinite.
+    - The residuals' deviations and all degrees of freedom are absent without a budget, as for a file of sweeps.
     """
 
     model: str

@@ -298,7 +298,7 @@ class _HandSearch:
         return [max(candidates, key=lambda candidate: (candidate.sizes[0], -candidate.sizes[1], -candidate.sizes[2]))]
 
     def finer(self, best: Candidate) -> Sequence[Candidate]:
-        """Return the candidates with fewer flips, down to the next coarse number."""
+        """Return the candidates with fewer flips than `best`, down to the next number that the first search tried."""
         flips, turns, rest_s = best.sizes
         below = max((number for number in FLIP_COUNTS if number < flips), default=int(flips))
         return [self._candidate(number, int(turns), rest_s) for number in range(below + 1, int(flips))]

@@ -74,10 +74,12 @@ class WorldClock:
         period_s = self._tick_s / self.time_scale
         due_s = self._anchor_wall_s + (self.tick + 1 - self._anchor_tick) * period_s
         now_s = self._wall()
-        if now_s - due_s > self._patience_s:
+        if now_s - due_s > self._patience_s:  # too late to catch up: from now on virtual time is later
             self._anchor()
             return 0.0
-        if now_s < self._dialogue_until_s:
+        if (
+            now_s < self._dialogue_until_s
+        ):  # a client waits for answers: no tick follows the last one faster than a real one
             due_s = max(due_s, self._counted_s + max(self._tick_s, period_s))
         return max(0.0, due_s - now_s)
 

@@ -114,7 +114,10 @@ def _turner_answers(turner: "Turner", options: Namespace) -> dict[str, Any]:
 
 
 def _lines_answers(options: Namespace, port: str, *, by_hand: bool) -> dict[str, Any]:
-    """Return the sensor's section if the device's lines are read, else the values that the user states."""
+    """Return the sensor's section, guessed from the device's lines if the user wants that and it succeeds.
+
+    Otherwise return only the values that the user states.
+    """
     choices = {"yes": "yes: ten seconds, and nothing is left to look up", "no": "no: write an example, to be edited"}
     user_values = ask_stated(options, by_hand=by_hand)
     if ask_choice("Look at the device now?", "--listen", choices, options.listen) == "yes":

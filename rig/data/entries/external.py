@@ -12,7 +12,7 @@ class OmittedIncrementsEntry(Entry):
 
 
 class RateSolutionEntry(Entry):
-    """The solution of a method that was not chosen, in the model g = K (m + b)."""
+    """The solution of a method that was not chosen: K and b of the model true rate = K (reading + b)."""
 
     scale: PositiveVector3
     bias_rad_s: Vector3

@@ -26,7 +26,10 @@ def begin_reading(path: Path, timeout_s: float | None = None) -> ReadingTask:
 
 
 def _limits(stored_bytes: int, time_s: float) -> ReadingLimits:
-    """Return the limits for reading a run file of `stored_bytes`, compressed as far as a run file may be."""
+    """Return the limits for reading a run file of `stored_bytes` in at most `time_s`.
+
+    They allow for the highest compression that a run file may have.
+    """
     rows_bytes = MAX_UNPACKED_RATIO * stored_bytes + MAX_UNWRITTEN_BYTES
     return ReadingLimits(LIBRARIES_BYTES + 3 * rows_bytes, time_s, time_s, 2 * rows_bytes)  # rows, and their copies
 

@@ -70,15 +70,16 @@ class PossibleChanges:
 def find_change(
     model: MixedModel, starts: Array, effects: Sequence[PossibleChanges], begins_s: Array, least_evidence: float
 ) -> AbruptChange | None:
-    """Return the most probable change before a row, or None if its evidence is at most `least_evidence`.
+    """Return the most probable change just before one of n readings, None if its evidence is at most `least_evidence`.
 
-    The rows are in the order of time and begin at `begins_s` (n,). The search is repeated with each row of
-    `starts` (s, k) as the standard deviations of the model's k errors; the first row is the most probable one if
-    nothing changed.
+    The readings are in the order of time and begin at `begins_s` (n,). A change inflates the estimated errors, so the
+    search is repeated from each of `starts` (s, k), standard deviations of the model's k errors; the first ones are the
+    most probable if nothing changed.
     """
     count = sum(int(effect.possible.any(axis=1).sum()) for effect in effects)
     log_without, change = model.evaluate_posterior(starts[0]) + float(np.log(max(count, 1))), None
     for std in starts:
+        # For fixed errors all times are quickly compared; only the best of them is fitted anew, errors included.
         inverse, innovation = model.restrict(std)
         evidence = [_weigh_rows(effect, inverse, innovation) for effect in effects]
         best = max(range(len(effects)), key=lambda index: float(evidence[index].max()))

@@ -231,7 +231,7 @@ def _tilt_sweeps(turns_rad_s: Array) -> Array:
 
 
 def _check_identifiable(inputs: VectorInputs, directions: Array, gravity: Array | None) -> None:
-    """Raise Fault unless sweeps and rests identify the Earth's rate with an ideal sensor.
+    """Raise Fault unless an ideal sensor could determine the Earth's rate from these sweeps and rests.
 
     The faults are `earth_rate_and_g_sensitivity`, `rank_deficient` and `ill_conditioned`.
     """

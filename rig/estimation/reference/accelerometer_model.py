@@ -63,10 +63,10 @@ class Sweeps:
     - covariances_m2_s4 (M, 9, 9): the harmonics' covariances, row by row (`rig.estimation.reference.sweep_harmonics`).
     - axes_flange (M, 3): unit vector about which the joint's angle grows; speeds_rad_s (M,): negative if it falls.
     - attitudes (M, 3, 3): flange to base at the angle zero.
-    - arms_m (M, 3): p, from the axis to the flange's origin, in flange coordinates.
+    - arms_m (M, 3): the vector p from the axis to the flange's origin, in flange coordinates.
     - stations (M,): index of each sweep's station, a joint and a pose; sweeps of a station, in both directions, share
       errors.
-    - turning_rad2_s2 (M, 6, 3): mean, cosine and sine of the joint's motion, as in `FirstHarmonic`.
+    - turning_rad2_s2 (M, 6, 3): mean, cosine and sine of six terms of the joint's motion, which `FirstHarmonic` lists.
     """
 
     harmonics_m_s2: Array

@@ -97,7 +97,10 @@ def bias_flicker(movement: Movement) -> Array:
 
 
 def find_drift_covariance(movement: Movement) -> Array:
-    """Return the covariance (3 K, 3 K) of the estimated bias drift: random walk and segments' disturbances."""
+    """Return the covariance (3 K, 3 K) of readings due to what the residuals show beyond noise.
+
+    That is a random walk of the bias, extra noise of disturbed segments, and another bias in sweeps than in dwells.
+    """
     sensor, covariance = movement.sensor_errors, np.zeros((movement.readings().size,) * 2)
     if sensor is not None and sensor.walk_m_s2_sqrt_s:
         covariance += sensor.walk_m_s2_sqrt_s**2 * unit_walk(sensor, movement)

@@ -27,7 +27,10 @@ from rig.estimation.reference.reference_model import (
 
 
 def stack(readings: Array, attitudes: Array, squares: Array | None) -> Array:
-    """Return the design matrix X (…, 3 N, 15) of Eq. (4); (…, 3 N, 18) if s² (…, N, 3) is given."""
+    """Return the design matrix X (…, 3 N, 15) of the paper's Eq. (4).
+
+    With the `squares` (…, N, 3) of the true quantity it has the three columns of Eq. (11) too: (…, 3 N, 18).
+    """
     x = np.zeros((*readings.shape, 15 if squares is None else 18))
     for i in range(3):
         x[..., i, 3 * i : 3 * i + 3] = readings

@@ -1,4 +1,4 @@
-"""A recomputation in documents: CSV for machines, a page of notable results, and its lines for a terminal."""
+"""Reports of a recomputation: CSV for machines, a page of notable results, and a summary for a terminal."""
 
 import csv
 import io

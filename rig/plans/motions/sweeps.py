@@ -78,7 +78,7 @@ def connect_sweeps(
 
 
 def trial(name: str, return_name: str, station: SweepPose, by_rad: float, pace: Pace) -> Iterator[Transfer]:
-    """Yield a small turn and its reverse, with these names, by which the sensors show how the item is mounted."""
+    """Yield a small turn called `name` and its reverse, `return_name`; they show how the item is mounted."""
     home, tried = station.pose_q_rad, station.rotate_joint(by_rad)
     for step in transfer(name, home, tried, pace):
         yield replace(step, tries=True)

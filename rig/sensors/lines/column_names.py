@@ -33,20 +33,22 @@ def state_unit(layout: TableLayout, index: int) -> str:
 
 def simplify_heading(layout: TableLayout, index: int) -> str:
     """Return a heading in the form of a device's column names: `gyro_x [deg/s]`."""
+    # A column of a matrix, as MATLAB and its users write it: imu.gyro(:,1) becomes gyro_x.
     name = layout.headings[index].rpartition(".")[2] if "(:" in layout.headings[index] else layout.headings[index]
     if (match := re.fullmatch(r"(.*)\((?::,)?([1-3])(?:,:)?\)", name)) is not None:
         name = f"{match[1]}_{'xyz'[int(match[2]) - 1]}"
-    name = re.sub(r"\s*[\[(].*?[\])]", "", name).strip()
+    name = re.sub(r"\s*[\[(].*?[\])]", "", name).strip()  # without a unit in brackets
+    # gyroX becomes gyro, x
     words = [word for word in re.split(r"[\W_]+", re.sub(r"([a-z])([XYZ])\b", r"\1_\2", name).lower()) if word]
     unit = state_unit(layout, index)
     if TEMPERATURE_WORDS.intersection(words) or BRACKETED_CELSIUS.search(layout.headings[index]):
         return "temp"
     words = _strip_units(_divide_axis(words))
-    if words and words[-1] not in AXES and words[0] in AXES:
+    if words and words[-1] not in AXES and words[0] in AXES:  # X Gyro
         words = [*words[1:], words[0]]
     axes = [word for word in words if word in AXES]
     before = [word for word in words if word not in AXES]
-    if len(axes) == 1 and (kind := _find_kind(before, unit)):  # X Gyro, acc_x_raw
+    if len(axes) == 1 and (kind := _find_kind(before, unit)):  # acc_x_raw becomes acc_x
         words = [kind, axes[0]]
     return "_".join(words) + (f" [{unit}]" if unit else "")
 

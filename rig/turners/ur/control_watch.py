@@ -1,9 +1,9 @@
-"""Detects that the rig could no longer stop an arm without the client, as after a change to local control.
+"""Detects that only the client program could still stop an arm, as after a change to local control.
 
-Local control disables every stop without the client. Neither the states nor the client report the mode, but the
-dashboard reports it if polled (since 5.6), as does the Robot API of a PolyScope X (since 10.12). When the mode changes,
-the controller also closes the connections of the primary interface (as the maker's client library and issue 459 of its
-ROS driver show). A controller of the CB3 series has no local control.
+In local control the controller ignores every stop by another route, dashboard or primary interface. Neither the states
+nor the client report the mode, but the dashboard reports it if polled (since 5.6), as does the Robot API of a PolyScope
+X (since 10.12). When the mode changes, the controller also closes the connections of the primary interface (as the
+maker's client library and issue 459 of its ROS driver show). A controller of the CB3 series has no local control.
 """
 
 import socket

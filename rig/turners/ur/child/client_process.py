@@ -286,9 +286,10 @@ class _Child:
             self.send(RequestFailed(move_failure("the controller did not start the move")))
 
     def _await_state(self) -> None:
-        """Wait for a new state. If none comes, the link is lost, and so the move did not begin.
+        """Wait for a new state after a move that did not begin, to learn whether the lost link is the cause.
 
-        The parent then reports the lost link before this wait ends.
+        If no state comes, the parent process, which waits for a shorter time, reports the lost link before this method
+        returns.
         """
         latest, began_s = self._latest, time.monotonic()
         while self._latest is latest and time.monotonic() - began_s < MAX_LAST_STOP_S:
