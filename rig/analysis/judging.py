@@ -77,18 +77,19 @@ def calibrate(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Out
             *(check for average in averages for check in average),
             *(
                 check
-                for name, result in dwells.accelerometers.items()
+                for name, result in dwells.accelerometers.results.items()
                 for check in acceleration_checks(name, result, settings.limits, _decision_rule(settings))
             ),
             *dwells.contradictions.checks,
             *(check for kind in installed_kinds for check in kind.checks),
-            *_check_unsolved(dwells.magnetometers, installed_kinds),
+            *_check_unsolved(dwells, installed_kinds),
         ),
         installed_kinds=installed_kinds,
         mounts=mounts,
         provenance=origin_of(runs),
         clock=swept.clock,
-        accelerometers=dwells.accelerometers,
+        accelerometers=dwells.accelerometers.results,
+        accelerometer_faults=dwells.accelerometers.faults,
         magnetometers=dwells.magnetometers,
         detection_limits=swept.detection_limits,
         reference_detection_limits=dwells.contradictions.detection_limits,
@@ -96,11 +97,10 @@ def calibrate(runs: Sequence[RunData], estimator: str, *, drifting: bool) -> Out
     )
 
 
-def _check_unsolved(
-    magnetometers: "Attempts[str, MagnetometerResult]", installed_kinds: Sequence[KindFound]
-) -> Iterator[Check]:
+def _check_unsolved(dwells: "_DwellOutcome", installed_kinds: Sequence[KindFound]) -> Iterator[Check]:
     """Yield a failing check for each sensor that was to be calibrated and has no solution."""
-    yield from list_unsolved((name, FIELD.name, fault) for name, fault in magnetometers.faults.items())
+    for quantity, attempts in ((ACCELERATION, dwells.accelerometers), (FIELD, dwells.magnetometers)):
+        yield from list_unsolved((name, quantity.name, fault) for name, fault in attempts.faults.items())
     yield from list_unsolved((kind.name, kind.quantity.name, kind.fault) for kind in installed_kinds if kind.fault)
 
 
@@ -158,7 +158,7 @@ class _DwellOutcome:
     """The part of an outcome from attitudes at rest; empty if no attitude was planned."""
 
     polynomials: "Polynomials"
-    accelerometers: "Mapping[str, AccelerometerResult]" = field(default_factory=dict)
+    accelerometers: "Attempts[str, AccelerometerResult]" = field(default_factory=Attempts)
     magnetometers: "Attempts[str, MagnetometerResult]" = field(default_factory=Attempts)
     contradictions: ConsistencyChecks = NO_CHECKS
 
@@ -166,11 +166,20 @@ class _DwellOutcome:
 def _judge_dwells(
     recordings: tuple[ObservedRun, ...], settings: RunSettings, swept: _GyroscopeOutcome, *, drifting: bool
 ) -> _DwellOutcome:
-    """Return the part of an outcome from dwells, of accelerometers and magnetometers; gyroscopes are solved already."""
+    """Return the part of an outcome from dwells, of accelerometers and magnetometers; gyroscopes are solved already.
+
+    An accelerometer without a solution does not affect the other sensors. Raise its Fault if there are no others, if
+    not all attitudes were recorded, or in a calibration over temperature or time.
+    """
     from rig.analysis.reference.accelerometer import calibrate_accelerometers
     from rig.analysis.reference.magnetometer import calibrate_magnetometers
 
-    accelerometers, polynomials = calibrate_accelerometers(recordings, settings, swept.results), swept.polynomials
+    attempts, polynomials = calibrate_accelerometers(recordings, settings, swept.results), swept.polynomials
+    others_are_solved = bool(attempts.results or swept.results) and not (polynomials or drifting)
+    for fault in attempts.faults.values():
+        if not others_are_solved or fault.name == "not_all_attitudes":  # the latter are made when the run is resumed
+            raise fault
+    accelerometers = attempts.results
     if polynomials:
         from rig.analysis.temperature.over_temperature import add_acceleration_polynomials
 
@@ -180,7 +189,7 @@ def _judge_dwells(
     magnetometers = calibrate_magnetometers(recordings, settings, accelerometers)
     return _DwellOutcome(
         polynomials=polynomials,
-        accelerometers=accelerometers,
+        accelerometers=replace(attempts, results=accelerometers),
         magnetometers=magnetometers,
         contradictions=check_references(recordings, accelerometers, magnetometers.results, settings, drifting=drifting),
     )

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from rig.data.recording.run_data import RunData
     from rig.data.recording.settings import RunSettings
     from rig.data.result_file import StoredCalibrationEntry
+    from rig.errors import Fault
     from rig.observation.observed_run import ObservedRun
 
 
@@ -68,6 +69,7 @@ class Outcome:
     - verifications: of the sensors that could be verified.
     - clock: comparison of the controller's clock, None if its uncertainty is not stated.
     - accelerometers: the calibrations of accelerometers.
+    - accelerometer_faults: why others have none.
     - magnetometers: the calibrations of magnetometers, without limits of scale and bias.
     - drifts: biases by repeat, if attitudes were repeated.
     - detection_limits: of the gyroscopes' checks.
@@ -87,6 +89,7 @@ class Outcome:
     verifications: "Mapping[str, Verification]" = field(default_factory=dict)
     clock: "ClockCheck | None" = None
     accelerometers: "Mapping[str, AccelerometerResult]" = field(default_factory=dict)
+    accelerometer_faults: "Mapping[str, Fault]" = field(default_factory=dict)
     magnetometers: "Attempts[str, MagnetometerResult]" = field(default_factory=Attempts)
     drifts: "Drifts" = field(default_factory=dict)
     detection_limits: "Mapping[str, tuple[DetectionLimit, ...]]" = field(default_factory=dict)

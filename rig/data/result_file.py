@@ -447,7 +447,7 @@ class ResultDocument(Entry):
     - bias_drift: biases by repeat of a run of that procedure, by sensor, then by "rate" and "acceleration".
     - over_temperature: calibrations over temperature, keyed in the same way; all other results then refer to their
       reference temperature.
-    - unsolved: why a quantity of external readings has no solution, by sensor, then by the quantity's name.
+    - unsolved: why a quantity has no solution, by sensor, then by the quantity's name.
     - omitted: parts left out of external readings; notes: remarks on how they were read.
     - others: results of kinds that packages add, by the kind's key, in the package's own format.
     - mounts: the error of the item's mounting in each stage of a run except the first.

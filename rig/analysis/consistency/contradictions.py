@@ -199,6 +199,6 @@ def contradicting_sweeps(runs: Sequence[RunData]) -> frozenset[int]:
         disturbed = contradictions(
             recordings, results, settings.to_calibrate, environment, settings, has_limits=False
         ).disturbed
-        accelerometers = calibrate_accelerometers(recordings, settings, results)
+        accelerometers = calibrate_accelerometers(recordings, settings, results).results
         disturbed |= check_references(recordings, accelerometers, {}, settings).disturbed
     return disturbed

@@ -116,21 +116,22 @@ class AccelerometerResult:
 
 def calibrate_accelerometers(
     recordings: Sequence[ObservedRun], settings: RunSettings, gyroscopes: Mapping[str, SensorResult] = NO_GYROSCOPES
-) -> dict[str, AccelerometerResult]:
+) -> Attempts[str, AccelerometerResult]:
     """Return the calibration, and alignment with the gyroscope, of each sensor with accelerations in dwells, by name.
 
-    Raise Fault `not_all_attitudes`, `second_order_not_seen`, `swapped_axes`, `mirrored_axis`, `wrong_mounting`, and
+    The Faults are `not_all_attitudes`, `second_order_not_seen`, `swapped_axes`, `mirrored_axis`, `wrong_mounting`, and
     what `solve_imu` and `solve_triaxial` raise.
     """
     if not settings.planned_dwells:
-        return {}
+        return Attempts()
     described = recordings[0].run.sensors
-    results = dict[str, AccelerometerResult]()
-    for name in settings.to_calibrate:
-        if described[name].measures(ACCELERATION):
-            with name_sensor(name, described), _advise_on_arm():
-                results[name] = _calibrate(name, recordings, settings, settings.site, gyroscopes.get(name))
-    return results
+
+    def solve(name: str) -> AccelerometerResult:
+        with name_sensor(name, described), _advise_on_arm():
+            return _calibrate(name, recordings, settings, settings.site, gyroscopes.get(name))
+
+    names = [name for name in settings.to_calibrate if described[name].measures(ACCELERATION)]
+    return attempt_each({name: partial(solve, name) for name in names})
 
 
 @contextmanager

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from rig.data.entries.result_types import ErrorEntry, OmittedEntry
+from rig.data.quantity import ACCELERATION
 from rig.data.result_file import ResultDocument
 from rig.report.entry import entry
 
@@ -30,6 +31,7 @@ def list_unsolved_entries(outcome: "Outcome") -> dict[str, dict[str, ErrorEntry]
     """Return why recorded quantities have no solution, by sensor and quantity."""
     reasons: dict[str, dict[str, ErrorEntry]] = {}
     faults = [(name, *failure) for name, sensor in outcome.external.items() for failure in sensor.unsolved.items()]
+    faults += [(name, ACCELERATION, fault) for name, fault in outcome.accelerometer_faults.items()]
     faults += [(kind.name, kind.quantity, kind.fault) for kind in outcome.installed_kinds if kind.fault is not None]
     for name, quantity, fault in faults:
         reasons.setdefault(name, {})[quantity.name] = ErrorEntry(error=str(fault))

@@ -121,7 +121,7 @@ def method_lines(entry: Any, quantity: Quantity, from_what: str = "") -> Iterato
 
 
 def describe_unsolved(document: ResultDocument, quantity: Quantity) -> Iterator[str]:
-    """Yield the reasons why a quantity of external readings has no solution."""
+    """Yield the reasons why a quantity has no solution."""
     for name, faults in document.unsolved.items():
         if (fault := faults.get(quantity.name)) is not None:
             yield f"{name}, {quantity.sensor}, not calibrated: {fault.error}"

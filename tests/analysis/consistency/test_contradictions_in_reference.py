@@ -144,7 +144,7 @@ def test_a_recording_as_it_was_made_contradicts_nothing(folder: str) -> None:
 def test_a_sensor_that_is_no_more_bent_than_its_data_sheet_says_is_within_its_uncertainty() -> None:
     """The simulated KVH 1775 has 0.09 % of v²/g on one axis, and the run did not look for it."""
     run = load_recording(KVH)
-    found = calibrate_accelerometers(observe_recordings([run]), run.settings)["kvh"]
+    found = calibrate_accelerometers(observe_recordings([run]), run.settings).results["kvh"]
     truth = yaml.safe_load((RECORDINGS / KVH / "config.yaml").read_text(encoding="utf-8"))["world"]["sensors"]["kvh"][
         "accelerometer"
     ]

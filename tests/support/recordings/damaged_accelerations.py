@@ -123,7 +123,7 @@ class Told:
 def find_contradictions(run: RunData) -> Told:
     """Check a recording's accelerometers and magnetometers. Raise Fault."""
     recordings = observe_recordings([run])
-    accelerometers = calibrate_accelerometers(recordings, run.settings)
+    accelerometers = calibrate_accelerometers(recordings, run.settings).results
     magnetometers = calibrate_magnetometers(recordings, run.settings, accelerometers)
     refused = frozenset(fault.name for fault in magnetometers.faults.values())
     return Told(check_references(recordings, accelerometers, magnetometers.results, run.settings).checks, refused)
