@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from rig.analysis.analyses import calibrate
+from rig.analysis.reference.magnetometer import calibrate_magnetometers
 from rig.data.recording.run_file import read_run
 from rig.errors import Fault, name_sensor
 from rig.observation.observed_run import observe_runs
@@ -40,3 +41,9 @@ def test_an_accelerometer_that_was_knocked_on_the_arm_costs_the_gyroscope_nothin
     assert "gyro.acceleration_unsolved" in {check.name for check in outcome.checks if not check.passed}
     why = document_of(outcome).unsolved["gyro"]["acceleration"].error
     assert why.startswith("attitude_untrustworthy: ") and "on the flange" in why and "body to table" not in why
+
+
+def test_a_magnetometer_without_a_solved_accelerometer_is_refused_by_name() -> None:
+    run = read_run(RECORDINGS / "magnetometer" / "run.h5")
+    (fault,) = calibrate_magnetometers(observe_runs([run]), run.settings, {}).faults.values()
+    assert str(fault).startswith("attitude_untrustworthy: no accelerometer has a solution")

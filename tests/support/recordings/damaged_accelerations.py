@@ -123,10 +123,11 @@ class Told:
 def find_contradictions(run: RunData) -> Told:
     """Check a recording's accelerometers and magnetometers. Raise Fault."""
     recordings = observe_recordings([run])
-    accelerometers = calibrate_accelerometers(recordings, run.settings).results
-    magnetometers = calibrate_magnetometers(recordings, run.settings, accelerometers)
-    refused = frozenset(fault.name for fault in magnetometers.faults.values())
-    return Told(check_references(recordings, accelerometers, magnetometers.results, run.settings).checks, refused)
+    accelerometers = calibrate_accelerometers(recordings, run.settings)
+    magnetometers = calibrate_magnetometers(recordings, run.settings, accelerometers.results)
+    refused = frozenset(fault.name for found in (accelerometers, magnetometers) for fault in found.faults.values())
+    found = check_references(recordings, accelerometers.results, magnetometers.results, run.settings)
+    return Told(found.checks, refused)
 
 
 def offset(by: float, where: Callable[[Readings], Mask]) -> Damage:
