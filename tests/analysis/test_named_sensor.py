@@ -14,6 +14,7 @@ from rig.report.document import document_of
 from support.paths import RECORDINGS
 
 
+@pytest.mark.slow
 def test_lost_samples_of_one_of_two_sensors_are_named_as_its_own() -> None:
     run = read_run(RECORDINGS / "verified" / "run.h5")
     samples = run.samples["reference"]
@@ -43,6 +44,7 @@ def test_an_accelerometer_that_was_knocked_on_the_arm_costs_the_gyroscope_nothin
     assert why.startswith("attitude_untrustworthy: ") and "on the flange" in why and "body to table" not in why
 
 
+@pytest.mark.slow
 def test_a_magnetometer_without_a_solved_accelerometer_is_refused_by_name() -> None:
     run = read_run(RECORDINGS / "magnetometer" / "run.h5")
     (fault,) = calibrate_magnetometers(observe_runs([run]), run.settings, {}).faults.values()

@@ -229,11 +229,24 @@ def test_what_is_wrong_with_it_has_a_name(chunks: Any, name: str) -> None:
     assert "sensors.imu" in str(refused.value)
 
 
+@pytest.mark.slow
 def test_a_time_in_another_unit_is_named_as_that() -> None:
     with (
         pty_printing(stream()) as (port, _),
         pytest.raises(SensorError, match=r"lines_other_rate: .*set lines\.time\.unit to us"),
         lines("imu", sensor_section(port, time={"unit": "ms", "wrap": 0}), Taken()),
+    ):
+        pass
+
+
+@pytest.mark.slow
+def test_a_time_that_starts_again_without_a_stated_wrap_does_not_stand() -> None:
+    begin = chain((printed(number) for number in range(400, 405)), stream())
+    section = {"unit": "us", "wrap": 0}
+    with (
+        pty_printing(begin) as (port, _),
+        pytest.raises(SensorError, match=r"lines_time_jumped: .* go back, from 4040000 to 0\. .*lines\.time\.wrap"),
+        lines("imu", sensor_section(port, time=section), Taken()),
     ):
         pass
 

@@ -78,7 +78,8 @@ class LinesDevice:
     ) -> None:
         """Open the port, and read until samples come at the stated rate.
 
-        Raise SensorError `no_port`, `lines_silent`, `lines_wrong_baud_rate`, `lines_other_format`, `lines_other_rate`.
+        Raise SensorError `no_port`, `lines_silent`, `lines_wrong_baud_rate`, `lines_other_format`, `lines_other_rate`,
+        `lines_time_stands`, `lines_time_jumped`.
         """
         self._sensor, self._line, self._section, self._rate_hz = sensor, line, section, rate_hz
         self._on_values = on_values
@@ -189,7 +190,7 @@ class LinesDevice:
     def _measure_rate_hz(self) -> float:
         """Return the sample rate, from the median step of the device's time or, if times are coarse, the total time.
 
-        Raise SensorError `lines_time_stands`.
+        Raise SensorError `lines_time_stands`, `lines_time_jumped`.
         """
         time_section = self._section.time
         if time_section is None or self.counts.samples < 5:
@@ -202,6 +203,13 @@ class LinesDevice:
             steps = steps[steps != 0]  # a line that is printed twice is one sample
         count = len(steps)
         typical_s = float(np.median(steps)) * unit_s if count else 0.0
+        if span_s <= 0 and np.ptp(printed) > 0:
+            raise SensorError(
+                "lines_time_jumped",
+                f"{self.where} prints times that go back, from {printed.max():.15g} to {printed.min():.15g}",
+                "If its time starts again at zero, set lines.time.wrap to the number at which it does; else it was "
+                "restarted: look at its supply",
+            )
         if span_s <= 0:
             raise SensorError(
                 "lines_time_stands",
