@@ -1,4 +1,4 @@
-"""Rests and moves by hand in coarse readings: what their steps hide, and a maximum that is no end of a range."""
+"""Rests and moves by hand in coarse or damaged readings: what steps hide, and what is no end of a range."""
 
 import numpy as np
 import pytest
@@ -33,6 +33,16 @@ def test_whole_degrees_hide_a_part_of_the_bias_and_end_at_no_range(how: str) -> 
     assert len(session.rests) == 3 and not any(move.clipped for move in session.moves)
     for rest in session.rests:
         assert (np.abs(rest.mean_rad_s - BIAS) < 2 * np.asarray(rest.rounding_rad_s)).all()
+
+
+def test_a_damaged_line_in_a_move_and_one_at_rest_are_interpolated() -> None:
+    time_s, rates = read()
+    damaged = rates.copy()
+    damaged[100], damaged[400, 1], damaged[900, 2] = 3.0, 200.0, -0.9
+    session = segment_session(time_s, damaged)
+    assert session.spikes_s == tuple(time_s[[100, 400, 900]])
+    assert len(session.rests) == 3 and max(move.peak_rad_s for move in session.moves) < 1.1
+    np.testing.assert_allclose(session.rates, rates, atol=0.02)
 
 
 def test_zeros_in_place_of_small_rates_hide_what_is_smaller_than_the_other_readings() -> None:

@@ -52,6 +52,26 @@ def test_a_sequence_counts_them_whatever_the_time_does(wrap: int) -> None:
     assert np.array_equal(numbers, kept) and stamper.lost == 28
 
 
+@pytest.mark.parametrize("damaged", [50, 59, 60])
+def test_one_time_too_far_ahead_costs_the_samples_up_to_it_and_no_more(damaged: int) -> None:
+    true_us = np.arange(100) * 10_000.0
+    printed = true_us.copy()
+    printed[damaged] += 200_000
+    stamper, numbers, times_us = stamped(rows(printed), columns=FOUR)
+    assert numbers[-1] == 99 and len(numbers) == 80 and stamper.lost == 20
+    assert times_us[-1] - times_us[0] == true_us[-1]
+
+
+def test_a_time_that_stands_or_alternates_ends_the_stream() -> None:
+    standing, alternating = np.arange(300) * 10_000.0, np.arange(600) * 10_000.0
+    standing[100:] = standing[100]
+    alternating[100:] = alternating[100]
+    alternating[101:] -= 5000
+    for printed in (standing, alternating):
+        with pytest.raises(SensorError, match="lines_time_jumped"):
+            stamped(rows(printed), columns=FOUR)
+
+
 @pytest.mark.parametrize(
     ("columns", "step", "wrap", "remedy"),
     [

@@ -62,7 +62,8 @@ class Move:
 class HandRecording:
     """All readings (n, 3) at times (n,), the rests (N,), and the N − 1 moves between them.
 
-    The body was held still in the air in the intervals `held_in_air_s`, and crept on the table in `creeping_s`.
+    The body was held still in the air in the intervals `held_in_air_s`, and crept on the table in `creeping_s`. The
+    rates at the times `spikes_s` are interpolated.
     """
 
     time_s: Array
@@ -72,6 +73,7 @@ class HandRecording:
     moves: tuple[Move, ...]
     held_in_air_s: tuple[tuple[float, float], ...] = ()
     creeping_s: tuple[tuple[float, float], ...] = ()
+    spikes_s: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -334,4 +334,9 @@ def _warnings(fit: GraphFit) -> tuple[str, ...]:
         if starts := [move.start_s for move in fit.session.moves if getattr(move, fault)]:
             at_s = ", ".join(f"{start_s:.1f}" for start_s in starts)
             warnings.append(f"{MOVES_LEFT_OUT}, the gyroscope {words}: from {at_s} s")
+    if spikes_s := fit.session.spikes_s:
+        warnings.append(
+            f"{len(spikes_s)} readings of the gyroscope, far from those before and after, are interpolated: the first "
+            f"at {spikes_s[0]:.1f} s"
+        )
     return tuple(warnings)

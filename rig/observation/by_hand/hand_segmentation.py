@@ -16,6 +16,7 @@ from rig.estimation.arrays import Array, equal_runs
 from rig.estimation.by_hand.session_parts import HandRecording, HandRest, Move
 from rig.estimation.statistics.rounding import Steps, bound_rounding_variance, find_steps
 from rig.observation.by_hand.rests import ROUNDING_TOLERANCE, find_rests
+from rig.observation.statistics.spikes import bridge_spikes, find_spikes
 from rig.observation.time_stamps.gaps import find_hiding_gaps
 from rig.observation.time_stamps.sampling import find_sampling
 from rig.observation.windows import Window
@@ -37,8 +38,10 @@ def segment_session(
 ) -> HandRecording:
     """Return the rests and moves that readings (n, 3), in rad/s and m/s², at rising times (n,) show.
 
-    `range_rad_s` is the gyroscope's range, None if unknown.
+    `range_rad_s` is the gyroscope's range, None if unknown. Spikes, as of damaged lines, are interpolated.
     """
+    if len(spikes := find_spikes(time_s, rates)):
+        rates = bridge_spikes(time_s, rates, spikes)
     windows = find_rests(time_s, {RATE: rates}, still_at_first=_began_still(time_s, rates)) if len(time_s) > 1 else ()
     steps = Steps(find_steps(rates))
     rests = tuple(_rest(time_s, rates, acceleration, window, steps) for window in windows)
@@ -50,7 +53,9 @@ def segment_session(
         inside = (time_s >= start_s) & (time_s <= end_s)
         peak = float(np.abs(rates[inside]).max())
         moves.append(Move(start_s, end_s, peak, bool(gaps[inside].any()), bool(top[inside].any())))
-    return HandRecording(time_s, rates, acceleration, rests, tuple(moves), _find_held_intervals(time_s, rates, rests))
+    held_in_air_s = _find_held_intervals(time_s, rates, rests)
+    spikes_s = tuple(time_s[spikes].tolist())
+    return HandRecording(time_s, rates, acceleration, rests, tuple(moves), held_in_air_s, spikes_s=spikes_s)
 
 
 def _find_gaps(time_s: Array, rates: Array) -> NDArray[np.bool_]:

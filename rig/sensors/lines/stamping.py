@@ -45,8 +45,10 @@ class Stamper:
     _number: int = -1
     _time_s: float = 0.0  # device's time since the first sample
     _odd_in_a_row: int = 0
+    _behind: int = 0  # rows in a row that show that the last one was damaged
     _last_time: float | None = None  # as printed
     _last_sequence: float | None = None
+    _before_last: tuple[float | None, float | None] = (None, None)  # time and sequence of the row before the last
     _smoothed: "SmoothedClock | None" = None
     _host_began_s: float | None = None
     _stamp_us: int = -1
@@ -69,7 +71,7 @@ class Stamper:
             if not len(values):
                 return is_sample, np.zeros(0, np.int64), np.zeros(0, np.int64)
             passed_s, steps = self._steps(values, skipped)
-        self._odd_in_a_row = 0
+        self._odd_in_a_row = self._behind = 0
         is_first = self._number < 0
         if self.section.clock == "arrival":
             steps = self._add_late(steps, host_time_s)
@@ -127,27 +129,50 @@ class Stamper:
 
     def _remember(self, row: Array) -> None:
         columns = self.section.columns
+        self._before_last = (self._last_time, self._last_sequence)
         self._last_time = float(row[columns.index("time")]) if "time" in columns else None
         self._last_sequence = float(row[columns.index("sequence")]) if "sequence" in columns else None
 
     def _select_possible(self, values: Array) -> NDArray[np.bool_]:
         """Return a mask of the rows that can follow the previous row. Raise SensorError `lines_time_jumped`."""
         is_sample = np.zeros(len(values), np.bool_)
-        last = (self._last_time, self._last_sequence)
+        state = (self._last_time, self._last_sequence, self._before_last)
         try:
             for index, row in enumerate(values):
-                passed_s, steps = self._steps(row[None], 0)
-                if self._is_possible(passed_s, steps).all():
-                    is_sample[index], self._odd_in_a_row = True, 0
+                if self._can_follow(row):
+                    is_sample[index], self._odd_in_a_row, self._behind = True, 0, 0
                     self._remember(row)
                     continue
                 self.odd += 1
+                if self._shows_false_last(row) and self._behind < MAX_GAP_S * self.rate_hz:
+                    self._behind += 1
+                    continue
                 self._odd_in_a_row += 1
                 if self._odd_in_a_row >= MAX_ODD_SAMPLES:
                     raise SensorError("lines_time_jumped", f"{self.where}: {self._jump(row)}", self._remedy(row))
         finally:
-            self._last_time, self._last_sequence = last
+            self._last_time, self._last_sequence, self._before_last = state
         return is_sample
+
+    def _can_follow(self, row: Array) -> bool:
+        """Return whether a row can follow the last one."""
+        return bool(self._is_possible(*self._steps(row[None], 0)).all())
+
+    def _shows_false_last(self, row: Array) -> bool:
+        """Return whether a row can follow the row before the last: the last one was damaged, and is too far ahead.
+
+        The rows up to the time of the damaged one are left out.
+        """
+        last = (self._last_time, self._last_sequence)
+        columns = self.section.columns
+        same = [row[columns.index(name)] == was for name, was in zip(("time", "sequence"), last, strict=True) if was]
+        if self._before_last == (None, None) or all(same):
+            return False
+        try:
+            self._last_time, self._last_sequence = self._before_last
+            return self._can_follow(row)
+        finally:
+            self._last_time, self._last_sequence = last
 
     def _is_possible(self, passed_s: Array, steps: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Return a mask of the samples that are within 2 s after the previous one; coarse times may also be equal."""
