@@ -45,6 +45,16 @@ def test_a_damaged_line_in_a_move_and_one_at_rest_are_interpolated() -> None:
     np.testing.assert_allclose(session.rates, rates, atol=0.02)
 
 
+def test_a_damaged_acceleration_is_not_in_the_mean_of_its_rest() -> None:
+    time_s, rates = read()
+    forces = np.tile([0.0, 0.1, 9.8], (len(time_s), 1)) + 0.02 * np.random.default_rng(2).normal(size=rates.shape)
+    forces[120, 1] = 9800.0
+    rest = segment_session(time_s, rates, forces).rests[0]
+    assert rest.acceleration_m_s2 is not None and rest.acceleration_noise_m_s2 is not None
+    np.testing.assert_allclose(rest.acceleration_m_s2, [0.0, 0.1, 9.8], atol=0.01)
+    assert rest.acceleration_noise_m_s2.max() < 0.03
+
+
 def test_zeros_in_place_of_small_rates_hide_what_is_smaller_than_the_other_readings() -> None:
     time_s, rates = read()
     limit = np.radians(2)

@@ -11,10 +11,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.data.quantity import RATE
+from rig.data.quantity import ACCELERATION, RATE
 from rig.estimation.arrays import Array, equal_runs
 from rig.estimation.by_hand.session_parts import HandRecording, HandRest, Move
 from rig.estimation.statistics.rounding import Steps, bound_rounding_variance, find_steps
+from rig.observation.by_hand.knocks import mask_knocks
 from rig.observation.by_hand.rests import ROUNDING_TOLERANCE, find_rests
 from rig.observation.statistics.spikes import bridge_spikes, find_spikes
 from rig.observation.time_stamps.gaps import find_hiding_gaps
@@ -78,19 +79,24 @@ def _margin_s(window: Window) -> float:
 
 
 def _rest(time_s: Array, rates: Array, acceleration: Array | None, window: Window, steps: Steps) -> HandRest:
-    """Return the rest in a window: means and standard deviations, for which a margin at either end is left out."""
+    """Return the rest in a window: means and standard deviations, for which a margin at either end is left out.
+
+    Single accelerations that are far from the others, as of damaged lines, are left out too.
+    """
     start_s, end_s = window.start_s + _margin_s(window), window.end_s - _margin_s(window)
     inside = (time_s >= start_s) & (time_s <= end_s)
+    at_rest = rates[inside]
     forces = None if acceleration is None else acceleration[inside]
+    forces = None if forces is None else forces[mask_knocks(forces, ACCELERATION)]
     return HandRest(
         start_s,
         end_s,
-        int(inside.sum()),
-        rates[inside].mean(axis=0),
-        rates[inside].std(axis=0, ddof=1),
+        len(at_rest),
+        at_rest.mean(axis=0),
+        at_rest.std(axis=0, ddof=1),
         None if forces is None else forces.mean(axis=0),
         None if forces is None else forces.std(axis=0, ddof=1),
-        _find_rounding_std(rates, rates[inside], steps),
+        _find_rounding_std(rates, at_rest, steps),
     )
 
 
