@@ -50,6 +50,7 @@ MAX_CLOSURE_STDS = 3.0  # error of a whole turn's end
 MAX_REFUSALS = 10  # in a row; then the session ends, because another error is likely
 # Moves in a row that contradict those before them; then one of those is likely to be wrong. Sessions begun again so.
 MAX_CONTRADICTIONS, MAX_DOUBTED_SESSIONS = 3, 2
+MAX_OPPOSITE = 4  # rests in a row with the side up that is opposite to the requested one
 UNFIT_RESTS = frozenset({"held_not_laid_down", "not_flat"})  # the item lies still, but not on a side
 LAID_AGAIN = UNFIT_RESTS | {"bias_jumped"}  # a rest is refused, and the item is to be laid down once more
 RESTARTS = frozenset(
@@ -88,6 +89,7 @@ class HandSession:
     _refused: int = 0  # number of refused moves in a row
     _contradicting: int = 0  # number of moves in a row that contradict those before them
     _doubted_sessions: int = 0  # number of times that the accepted moves were given up for that
+    _opposite: int = 0  # number of rests in a row on the side opposite to the requested one
     _bias_doubted: bool = False  # whether the item may have crept at the previous rest
     _reminded: bool = False
     _request: HandAsked | None = None
@@ -168,6 +170,7 @@ class HandSession:
             last = Instruction("lay", FACES[0]) if self._request is None else self._request.instruction
             self._ask(last if face is None else Instruction("lay", face), wrong)
             return
+        self._refuse_opposite(face)
         self._bias_doubted = False
         self.note(HandRested(*self._board_us(rest), face))
         if move is not None and now.moves and wrong is None:  # a move after a mere pause begins at no rest
@@ -189,6 +192,20 @@ class HandSession:
             f"the last {MAX_CONTRADICTIONS} moves contradict those before them, so one of those was wrong",
             "Go on as the rig asks: the moves are counted from here",
         )
+
+    def _refuse_opposite(self, face: Face) -> None:
+        """Raise Fault `accelerometer_inverted` if again and again the side opposite to the requested one is up."""
+        if self._request is None or self._request.instruction.say != "lay":
+            return
+        wanted = self._request.instruction.face
+        self._opposite = self._opposite + 1 if face != wanted and face[1] == wanted[1] else 0
+        if self._opposite >= MAX_OPPOSITE:
+            raise Fault(
+                "accelerometer_inverted",
+                f"{MAX_OPPOSITE} times in a row the side opposite to the requested one was up, now {face}",
+                "See that the axes on the item are marked rightly. If they are, the accelerometer has the wrong sign: "
+                "at rest an axis that points upwards reads +1 g. Correct the program of the device",
+            )
 
     def _pauses_before(self, rest: HandRest) -> None:
         """Discard the unjudged rests before `rest`, which are too short and so are pauses within a move."""

@@ -86,6 +86,13 @@ def test_a_turn_after_which_it_was_laid_down_again_is_asked_again() -> None:
     held(table)
 
 
+def test_an_accelerometer_of_the_wrong_sign_is_named_before_the_operator_gives_up() -> None:
+    table = Table(seed=3, settings=SHORT, force_sign=-1.0)
+    with pytest.raises(Fault) as fault:
+        table.sit()
+    assert fault.value.name == "accelerometer_inverted" and table.time_s < 60
+
+
 @pytest.mark.thorough
 def test_who_holds_it_in_the_hand_is_told_to_lay_it_down() -> None:
     table = Table(seed=6, mistakes={"held": 0.2}, settings=SHORT)

@@ -47,7 +47,8 @@ LIST = HandSettings(flips=12, turns=3, rest_s=1.0, box_rad=float(np.radians(0.2)
 class Table:
     """A session: its `events` in their order.
 
-    The operator makes the mistake `in_turn` in the first turn. In the rest number `creeps` the item turns slowly.
+    The operator makes the mistake `in_turn` in the first turn. In the rest number `creeps` the item turns slowly. The
+    accelerometer's readings times `force_sign` are its usual ones.
     """
 
     seed: int
@@ -56,6 +57,7 @@ class Table:
     hand: dict[str, Any] = field(default_factory=dict)
     creeps: int | None = None
     in_turn: Mistake | None = None
+    force_sign: float = 1.0
     events: list[HandEvent] = field(default_factory=list)
     time_s: float = 0.0
 
@@ -135,7 +137,7 @@ class Table:
         samples["host_time_s"] = times + 1.0
         true_rates = np.array([motion.rate_rad_s for motion in motions])
         rates = (true_rates + self._creeping(true_rates)) @ MATRIX.T + OFFSET
-        forces = np.array([motion.force_m_s2 for motion in motions])
+        forces = self.force_sign * np.array([motion.force_m_s2 for motion in motions])
         self._fill(samples, RATE, rates + self._random.normal(0, NOISE, rates.shape), PER_COUNT)
         self._fill(samples, ACCELERATION, forces + self._random.normal(0, 0.02, forces.shape), PER_COUNT_M_S2)
         self._count += count
