@@ -296,11 +296,12 @@ def test_a_bias_that_jumps_for_good_ends_a_session_at_the_right_rest(after: int)
     assert f"ended at {session.rests[after + 1].start_s:.1f} s" in refusal.value.problem.what
 
 
-@pytest.mark.parametrize("program", ["whole degrees", "zeros for small rates"])
-def test_what_a_program_does_to_small_rates_widens_u_of_the_bias(program: str) -> None:
+@pytest.mark.parametrize("program", ["whole degrees", "cut to whole degrees", "zeros for small rates"])
+def test_what_a_program_does_to_small_rates_widens_u(program: str) -> None:
     recorded, step = handle(SESSION, 3), float(np.radians(2))
     coarse = {
         "whole degrees": step / 2 * np.round(recorded.rates / (step / 2)),
+        "cut to whole degrees": step / 2 * np.trunc(recorded.rates / (step / 2)),
         "zeros for small rates": np.where(np.abs(recorded.rates) < step, 0.0, recorded.rates),
     }
     found = solved(replace(recorded, rates=coarse[program]))

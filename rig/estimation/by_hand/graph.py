@@ -241,7 +241,7 @@ def _rest_columns(row: int) -> tuple[slice, slice]:
 
 def _move(graph: Graph, row: int) -> Factor:
     """Return the factor of a move, whose integrated rates must rotate the attitude at its start to that at its end."""
-    integrals, stds = graph.integrals, graph.stds
+    session, integrals, stds = graph.session, graph.integrals, graph.stds
     design = np.zeros((3, graph.width))
     (first, first_bias), (second, second_bias) = _rest_columns(row), _rest_columns(row + 1)
     design[:, MATRIX], design[:, GRAVITY] = integrals.by_matrix[row], integrals.by_gravity[row]
@@ -254,6 +254,10 @@ def _move(graph: Graph, row: int) -> Factor:
         "of_angle": np.full(3, stds.of_angle * np.sqrt(QUARTER_RAD * integrals.paths_rad[row])),
         # A bias that jumps does so at any time of the move.
         "jump": np.full(3, np.linalg.norm(graph.bias_changes_rad_s[row]) * integrals.durations_s[row] / np.sqrt(12)),
+        # A program that cuts digits makes all rates smaller by half a step. This error is common to all moves, of
+        # which a third turn about each axis; the factors count as independent.
+        ROUNDING: np.broadcast_to(session.coarse_rad_s, 3)
+        * (integrals.durations_s[row] * np.sqrt(len(session.moves) / 3 / 12)),
     }
     return Factor(MOVE, row, graph.residuals_rad[row], design, causes)
 

@@ -63,7 +63,8 @@ class HandRecording:
     """All readings (n, 3) at times (n,), the rests (N,), and the N − 1 moves between them.
 
     The body was held still in the air in the intervals `held_in_air_s`, and crept on the table in `creeping_s`. The
-    rates at the times `spikes_s` are interpolated.
+    rates at the times `spikes_s` are interpolated. `coarse_rad_s` (3,) are steps of the rates that are large enough to
+    matter, 0 for finer ones.
     """
 
     time_s: Array
@@ -74,6 +75,7 @@ class HandRecording:
     held_in_air_s: tuple[tuple[float, float], ...] = ()
     creeping_s: tuple[tuple[float, float], ...] = ()
     spikes_s: tuple[float, ...] = ()
+    coarse_rad_s: Array | float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -38,7 +38,7 @@ CONTRIBUTORS: dict[str, tuple[Literal["A", "B"], tuple[str, ...], str]] = {
         ("walk", "earth", "bias", "drift", "jump"),
         "scatter of the rests; the Earth's rate",
     ),
-    ROUNDING: ("B", (ROUNDING,), "the steps of the readings, at rest"),
+    ROUNDING: ("B", (ROUNDING,), "the steps of the readings, which may be rounded or cut"),
     "angles of the moves": ("A", ("of_angle",), "how the moves contradict each other"),
     "nonlinearity": ("B", ("nonlinearity", "matrix"), "what is known of parts, and the moves this way and that"),
     "g-sensitivity": ("B", ("g-sensitivity",), "what is known of parts, and the rests on opposite faces"),

@@ -25,6 +25,7 @@ from rig.observation.windows import Window
 MARGIN_S = 0.1  # time at either end of a rest that is assigned to the adjacent moves
 MIN_GAP_READINGS = 2  # fewest missing readings that count as a gap
 MIN_SATURATED = 3  # equal readings in a row at the largest value
+MIN_COARSE_RAD_S = float(np.radians(0.1))  # step below which cut digits change a quarter turn by less than 5e-4
 ONE_STEP = 1.5  # steps of coarse readings, between one and two
 MIN_CLIPPED_FRACTION = 0.8  # of readings at the end of a range among those within a step of it; a parabola has 0.71
 SATURATION_FRACTION = 0.995
@@ -56,7 +57,10 @@ def segment_session(
         moves.append(Move(start_s, end_s, peak, bool(gaps[inside].any()), bool(top[inside].any())))
     held_in_air_s = _find_held_intervals(time_s, rates, rests)
     spikes_s = tuple(time_s[spikes].tolist())
-    return HandRecording(time_s, rates, acceleration, rests, tuple(moves), held_in_air_s, spikes_s=spikes_s)
+    coarse_rad_s = np.where(steps.units > MIN_COARSE_RAD_S, steps.units, 0.0)
+    return HandRecording(
+        time_s, rates, acceleration, rests, tuple(moves), held_in_air_s, spikes_s=spikes_s, coarse_rad_s=coarse_rad_s
+    )
 
 
 def _find_gaps(time_s: Array, rates: Array) -> NDArray[np.bool_]:
