@@ -182,6 +182,27 @@ FORMATS = {
 }  # fmt: skip
 
 
+BESIDE = {
+    "the registers of an MPU-6050, with its thermometer between": Format(
+        lambda r: text("%d,%d,%d,%d,%d,%d,%d,%d", 1e6 * r["t"], *counts(g(r), 16384), (r["temp"] - 36.53) * 340,
+                       *counts(deg(r), 131)), "time ax ay az - gx gy gz", {"rate": {"scale": 1 / 131}}),
+    "angles before": Format(
+        lambda r: text("%d,%.2f,%.2f,%.2f,%.4f,%.4f,%.4f,%.3f,%.3f,%.3f", 1e6 * r["t"],
+                       *(90 * (v - at_rest) for v, at_rest in zip(g(r), g(moved(100.0)[0]), strict=True)), *g(r),
+                       *deg(r)),
+        "time - - - ax ay az gx gy gz", {"rate": {"unit": "deg/s"}}),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", BESIDE)
+def test_the_gyroscope_is_the_triad_as_which_gravity_rotates(name: str) -> None:
+    wanted = BESIDE[name]
+    found = guess(find_shape(arrived(wanted)), STILL_S)
+    assert found.columns == wanted.columns.split()
+    for key, value in wanted.wanted["rate"].items():
+        assert found.units["g"][key] == (value if isinstance(value, str) else pytest.approx(value))
+
+
 def inspect_file(name: str) -> tuple[Shape, Guess]:
     shape = find_shape(arrived(FORMATS[name]))
     return shape, guess(shape, STILL_S)

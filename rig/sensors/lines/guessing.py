@@ -7,7 +7,7 @@ gravity determines the gyroscope's unit.
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -188,7 +188,8 @@ def find_triads(shape: Shape, guess: Guess, still: Flags, starts: Iterable[int] 
 
     `starts` are the columns with which a triad may begin, all if None.
     """
-    for start in range(shape.values.shape[1] - 2) if starts is None else starts:
+    named, starts = "gx" in guess.columns, list(range(shape.values.shape[1] - 2) if starts is None else starts)
+    for start in starts:
         places = slice(start, start + 3)
         if guess.columns[places] != ["-"] * 3 or np.isnan(shape.values[:, places]).any():
             continue
@@ -199,6 +200,8 @@ def find_triads(shape: Shape, guess: Guess, still: Flags, starts: Iterable[int] 
         axes = [kind + axis for axis in "xyz"]
         if not all(axis in guess.columns for axis in axes):
             guess.columns[:] = ["-" if name in axes else name for name in guess.columns]
+    if not named:
+        _choose_gyroscope(shape, guess, still, starts)
     for kind in "amg":  # the gyroscope's unit comes from gravity
         if kind + "x" in guess.columns:
             guess.units[kind] = _unit(shape, guess, kind, still)
@@ -206,6 +209,24 @@ def find_triads(shape: Shape, guess: Guess, still: Flags, starts: Iterable[int] 
         guess.gaps.append(
             "which columns are the gyroscope: no three read about zero at rest and much when they are turned"
         )
+
+
+def _choose_gyroscope(shape: Shape, guess: Guess, still: Flags, starts: Iterable[int]) -> None:
+    """Enter into the guess as the gyroscope the triad as which gravity rotates; if there is none, nothing changes.
+
+    Angles, quaternions and a temperature beside a gyroscope's axis also read little at rest, and much when turned.
+    """
+    others = ["-" if name in ("gx", "gy", "gz") else name for name in guess.columns]
+    first = [start for start in starts if guess.columns[start] == "gx"]
+    for start in (*first, *starts):
+        places = slice(start, start + 3)
+        values = shape.values[:, places]
+        if others[places] != ["-"] * 3 or np.isnan(values).any() or _kind(values, still) != "g":
+            continue
+        columns = [*others[:start], "gx", "gy", "gz", *others[start + 3 :]]
+        if _rate_unit(shape, replace(guess, columns=columns, gaps=[]), values, still) is not None:
+            guess.columns = columns
+            return
 
 
 def _kind(values: Array, still: Flags) -> str | None:
