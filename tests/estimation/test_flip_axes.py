@@ -69,6 +69,16 @@ def test_rests_too_short_to_be_found_are_no_fault_of_the_axes(seed: int, rest_s:
     check(handled(seed, rest_s))
 
 
+@pytest.mark.parametrize(("factor", "is_named"), [(0.25, True), (0.5, True), (0.7, False), (2.0, False), (4.0, True)])
+def test_the_scale_of_another_range_is_named_where_no_fit_converges(factor: float, is_named: bool) -> None:
+    recorded = replace(handled(), rates=factor * handled().rates)
+    if not is_named:
+        check(recorded)
+        return
+    with pytest.raises(Fault, match=r"wrong_unit: .* on all axes, as with the scale of another range"):
+        check(recorded)
+
+
 def test_another_unit_is_named() -> None:
     with pytest.raises(Fault, match="wrong_unit"):
         check(replace(handled(), rates=np.radians(handled().rates)))

@@ -16,6 +16,7 @@ MIN_FLIPS, MAX_UNEXPLAINED = 5, 0.2
 MAX_SKEW_COSINE = 0.3  # between two axes: those of a part are nearer to a right angle
 MAX_FRAME_ANGLE_RAD = 1.1  # of gyroscope and accelerometer: no fit converges from a larger one
 MAX_SCALE_RATIO = 20.0  # a whole turn that is merged with a flip reads only five times as much; more is another unit
+MIN_FIT_RATIO, MAX_FIT_RATIO = 0.58, 2.5  # within these the fit finds the scale, and limits judge it
 MAX_RATE_RAD_S = 150.0  # no gyroscope of this kind reads as much: the unit is degrees
 
 
@@ -58,10 +59,26 @@ def _check_quarters(about: Array, swept: Array) -> None:
         return
     names = [nearest_face(row) for row in unit]
     if names == ["+x", "+y", "+z"]:
+        _check_size(sizes)
         return
     axes_read = f"the gyroscope's x, y, z read the rotation about the accelerometer's {', '.join(names)}"
     remedy = "Correct order and signs of the columns of one of them"
     raise Fault("mirrored_axis" if strongest.tolist() == [0, 1, 2] else "swapped_axes", axes_read, remedy)
+
+
+def _check_size(sizes: Array) -> None:
+    """Raise Fault `wrong_unit` if all axes read so much less or more than the true angle that no fit converges.
+
+    `sizes` (3,) are the readings of a quarter turn, relative to the true ones.
+    """
+    if not (sizes.max() < MIN_FIT_RATIO or sizes.min() > MAX_FIT_RATIO):
+        return
+    size = float(np.mean(sizes))
+    raise Fault(
+        "wrong_unit",
+        f"a quarter of a turn reads {size:.3g} times as much on all axes, as with the scale of another range",
+        "Convert the counts by the scale of the range that the device's program sets",
+    )
 
 
 def _check_turned(unit: Array) -> None:
