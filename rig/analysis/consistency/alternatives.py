@@ -1,7 +1,7 @@
-"""Possible faults of a gyroscope during a recording: the tested alternatives, and fault modes of a given size.
+"""Possible faults of a gyroscope during a recording: the columns that the checks test, and realistic fault modes.
 
-A check tests how much of the residuals its columns explain. A fault mode is a realistic fault, similar to its check's
-columns.
+A column is the effect of a possible fault on all readings. A check tests how much of the residuals its columns explain.
+A fault mode resembles the columns of its check; the smallest detectable size of each fault mode is reported.
 """
 
 from dataclasses import dataclass
@@ -36,18 +36,18 @@ class Means:
 
     @property
     def sweeps(self) -> Array:
-        """Columns (N, M): 1 if a mean belongs to the sweep, else 0."""
+        """A column (N,) for each of M sweeps, as (N, M): 1 if a mean belongs to the sweep, else 0."""
         sweeps: Array = (self.sweep[:, None] == distinct(self.sweep[self.sweep >= 0])).astype(np.float64)
         return sweeps
 
 
 def _axis_patterns(columns: Array) -> Array:
-    """Return three patterns (3, N, 3); each has one of the `columns` (N, 3) on the axis of the same index."""
+    """Return three patterns (3, N, 3): pattern i has column i of `columns` (N, 3) on axis i, and zeros elsewhere."""
     return np.moveaxis(split_per_axis(columns), -1, 0).swapaxes(1, 2)
 
 
 def _sweep_patterns(means: Means) -> Array:
-    """Return the patterns (3 M, N, 3), in the N means, of a change on one axis during one of M sweeps."""
+    """Return the patterns (3 M, N, 3) in the N means: each is an offset of one axis during one of M sweeps."""
     alone = means.sweeps.T[:, None, :, None] * np.eye(3)[None, :, None, :]
     return np.asarray(alone.reshape(-1, len(means.sweep), 3), dtype=np.float64)
 
@@ -82,7 +82,10 @@ FAULT_MODES: tuple[FaultMode[Means], ...] = (  # (k, N, 3) each
 
 
 def changes(segments: Segments, axis_rates: Array) -> dict[str, Array]:
-    """Return the effects (3, N, k) of a scale factor or a mounting that changes with time, by the name of the check."""
+    """Return the effects on the means of scale factors or a mounting that change steadily, by the name of the check.
+
+    The effects (3, N, 3) are three columns, each with the values of axes x, y, z in N segments.
+    """
     time = normalise_time(segments)
     for sweep in distinct(segments.sweep):  # a change within a sweep is tested for that sweep
         time[segments.sweep == sweep] = time[segments.sweep == sweep].mean()
@@ -96,8 +99,8 @@ def changes(segments: Segments, axis_rates: Array) -> dict[str, Array]:
 def differences(segments: Segments, axis_rates: Array, whole: Array | None) -> dict[str, Array | None]:
     """Return the effects (3, N, k) of a difference between directions, sweeps or rests, by the name of the check.
 
-    The check `residuals` has the columns `whole` (3, N, k), which give each sweep its own mean. If `whole` is None, the
-    check uses all residuals, including the scatter within sweeps.
+    The check `residuals` has the columns `whole` (3, N, k). If `whole` is None, it uses all residuals, including the
+    scatter within sweeps.
     """
     columns_by_name: dict[str, Array | None] = {
         "cw_against_ccw": split_per_axis(np.abs(axis_rates)),
@@ -110,7 +113,10 @@ def differences(segments: Segments, axis_rates: Array, whole: Array | None) -> d
 
 
 def single_axis_columns(segments: Segments, axis_rates: Array) -> Array:
-    """Return the effect (3, N, k) of a changed scale factor, for each axis and each start of a sweep or transfer."""
+    """Return the effects (3, N, k) of a scale factor of one axis that changes at the start of a sweep or transfer.
+
+    There is a column for each axis and each such start, except the first.
+    """
     moving = distinct(segments.sweep[segments.sweep != REST])
     starts = distinct(np.array([segments.times_s[segments.sweep == sweep].min() for sweep in moving]))
     later = segments.times_s.mean(axis=1)[:, None] > starts[1:]
@@ -131,7 +137,7 @@ def sweep_columns(segments: Segments, sweep: int) -> Array:
 
 
 def step_columns(segments: Segments) -> list[Array]:
-    """Return a step (N, 1), 0 before and 1 after, at the end of each sweep that lies between rests."""
+    """Return for each sweep between two rests a step (N, 1) at the sweep's end: 0 before it, 1 after it."""
     middle = segments.times_s.mean(axis=1)
     ends = [segments.times_s[segments.sweep == sweep].max() for sweep in distinct(segments.sweep[segments.sweep >= 0])]
     steps = [np.where(middle < end, 0.0, 1.0)[:, None] for end in ends]
@@ -139,19 +145,19 @@ def step_columns(segments: Segments) -> list[Array]:
 
 
 def normalise_time(segments: Segments) -> Array:
-    """Return the times (N,) of the segments' middles, from −1 to 1."""
+    """Return the middle times (N,) of the segments, scaled linearly so that they range from −1 to 1."""
     middle = segments.times_s.mean(axis=1)
     time: Array = (2 * middle - middle.max() - middle.min()) / np.ptp(middle)
     return time
 
 
 def repeat_per_axis(columns: Array) -> Array:
-    """Return columns (3, N, 3 k) from (N, k): separate columns for each axis."""
+    """Return `columns` (N, k) repeated for each axis, as (3, N, 3 k); a copy acts on one axis and is zero elsewhere."""
     count, wide = columns.shape
     return np.asarray(np.einsum("ij,nk->injk", np.eye(3), columns).reshape(3, count, 3 * wide), dtype=np.float64)
 
 
 def split_per_axis(columns: Array) -> Array:
-    """Return columns (3, N, 3) from (N, 3): a separate column for each axis."""
+    """Return columns (3, N, 3) from `columns` (N, 3), of which column i acts on axis i and is zero on the others."""
     stacked: Array = np.einsum("ij,ni->inj", np.eye(3), columns)
     return stacked

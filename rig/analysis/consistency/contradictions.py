@@ -110,11 +110,11 @@ def contradictions(
 
 
 def _non_orthogonality_deg(solution: VectorSolution, stated_deg: float, false_alarm_probability: float) -> Statistic:
-    """Return the non-orthogonality that most exceeds the stated one, and its limit, both in degrees.
+    """Return the non-orthogonality that exceeds its limit most or comes nearest to it, and this limit, in degrees.
 
-    `stated_deg` is a half-width. The limit includes the angle's uncertainty at this false-alarm probability. This check
-    is needed because sweeps about three axes cannot separate a wrist's zero error from a tilted sensor axis. So
-    no residual shows the zero error, although it makes the scale factors wrong if the sensor is mounted askew.
+    The limit is the stated half-width `stated_deg` plus the angle's uncertainty at this false-alarm probability. The
+    check is needed because no residual shows a zero error of a wrist: with sweeps about three axes, the error looks
+    like a tilted sensor axis. Yet it makes the scale factors wrong if the sensor is mounted askew.
     """
     from scipy.special import ndtri
 
@@ -135,8 +135,8 @@ def check_references(
 ) -> ConsistencyChecks:
     """Return the checks for contradictions within the readings of each accelerometer and magnetometer.
 
-    A check of a disturbed dwell or sweep has the motion's index at the end of its name, as in
-    `gyro.acceleration_disturbed_dwell.13`. `drifting`: whether the bias may drift.
+    A check of a disturbed dwell or sweep has the index of this dwell or sweep at the end of its name, as in
+    `gyro.acceleration_disturbed_dwell.13`. If `drifting`, a steady drift of the bias is no contradiction.
     """
     from rig.analysis.consistency.reference_contradictions import (
         ReferenceReadings,
@@ -168,15 +168,18 @@ def check_references(
 
 
 def _false_alarm_probability(run: RunData, sensors: Sequence[str], settings: RunSettings, false_alarms: float) -> float:
-    """Return the false-alarm probability of one statistic: a run's `false_alarms`, divided among its statistics."""
+    """Return the false-alarm probability of one check, if all checks of a run share the probability `false_alarms`.
+
+    These are the checks of the gyroscopes `sensors`, of the accelerometers to calibrate, and of all magnetometers.
+    """
     accelerometers = run.measuring(ACCELERATION).keys() & settings.to_calibrate
     return false_alarm_per_check(len(sensors) + len(accelerometers) + len(run.measuring(FIELD)), of_all=false_alarms)
 
 
 def contradicting_sweeps(runs: Sequence[RunData]) -> frozenset[int]:
-    """Return the sweeps of an unfinished run that contradict the other sweeps for any sensor, judged as in the verdict.
+    """Return the indices of the sweeps of an unfinished run that, for any sensor, contradict the other sweeps.
 
-    A sensor without a solution so far contributes no sweep.
+    They are judged as in the verdict. Sensors that cannot be solved so far are left out.
     """
     settings = runs[0].settings if runs else None
     if settings is None or not settings.planned_sweeps:

@@ -43,14 +43,14 @@ MAX_STEP_COUNTS = 1.5  # readings in larger steps are not those of a converter
 
 @dataclass(frozen=True, slots=True)
 class Digits:
-    """The recorded numbers of a source: their `steps` in counts, and whether their bits can be tested (`has_bits`)."""
+    """The resolution of recorded numbers: their `steps` in counts, and if their bits can be tested (`has_bits`)."""
 
     has_bits: bool
     steps: Steps
 
     @property
     def step_counts(self) -> Array:
-        """The largest difference (3,) of neighbouring numbers, in counts."""
+        """The largest range (3,) of values that one recorded number may represent, in counts."""
         return self.steps.units * (2 if self.steps.cut else 1)
 
 
@@ -58,10 +58,10 @@ CONVERTER_DIGITS = Digits(True, Steps(1.0))
 
 
 def find_digits(sensor: RecordedSensor, quantity: Quantity, samples: Sequence[NDArray[Any]]) -> Digits:
-    """Return the steps of a quantity's recorded numbers, at least one count, from all samples (n,) of each recording.
+    """Return the resolution of a quantity's recorded numbers, from all `samples` (n,) of each recording.
 
-    The bits can be tested of a board's numbers, which are the counts of the part's converter. Other sources send
-    computed or printed numbers; their bits mean nothing if the numbers change in steps of several counts.
+    Steps are at least one count. A board sends the counts of the converter, so their bits can be tested. Other sources
+    send computed or printed numbers, whose bits mean nothing if the numbers change in steps of several counts.
     """
     channel = sensor.channel(quantity)
     values = np.concatenate([channel.values(recorded) for recorded in samples])
@@ -79,11 +79,11 @@ def judge_readings(
     digits: Digits = CONVERTER_DIGITS,
     frozen: int = 0,
 ) -> Statistics:
-    """Return statistic and limit by the check's name, from all readings (n, 3) and the windows of each recording.
+    """Return a statistic and its limit for each check of a converter, by the check's name.
 
-    Each statistic has at most the given false-alarm probability. The noise is the median over the windows at rest, so
-    that it is not zero if an axis is stuck in some of them. `frozen`: the longest run of equal readings of an axis
-    during motion.
+    `counts` are all readings (n, 3) of each recording, `windows` the readings in sweeps and rests. `frozen` is the
+    number of readings in the longest run of equal readings of an axis during motion. A statistic of a healthy converter
+    exceeds its limit with at most the given false-alarm probability.
     """
     from scipy.special import ndtri
 
@@ -91,7 +91,7 @@ def judge_readings(
     critical_value = -float(ndtri(false_alarm_probability / (2 * 3 * 16)))
     at_rest = [window for window in windows if window.sweep < 0] or windows
     noises = [innovation_std(window.counts) for window in at_rest]
-    noise = median(np.array(noises), axis=0)
+    noise = median(np.array(noises), axis=0)  # not zero if an axis is stuck in a few windows only
     steps_of_noise = noise / digits.step_counts
     noisy = steps_of_noise >= 1
     spikes, spike_bits = _find_spikes(windows, digits.step_counts)
@@ -130,7 +130,7 @@ def _count_constant_bits(counts: NDArray[np.int64]) -> int:
 
 
 def _count_uneven_bits(windows: Sequence[RawReadings], noise: Array, critical_value: float) -> int:
-    """Count the bits of all axes that are well below the noise, but not set in half of the readings."""
+    """Count the bits, over all axes, that are worth less than the noise but not set in about half of the readings."""
     uneven = 0
     counts = np.concatenate([window.counts for window in windows])
     for axis in range(3):
@@ -144,10 +144,10 @@ def _count_uneven_bits(windows: Sequence[RawReadings], noise: Array, critical_va
 
 
 def _find_spikes(windows: Sequence[RawReadings], step_counts: Array) -> tuple[float, int]:
-    """Return the largest deviation relative to noise, and the number of axes whose spikes are mostly one power of two.
+    """Return the largest deviation relative to noise, and the number of axes with a bit that flips.
 
-    Such spikes come from a faulty bit. The noise includes vibration and is at least half a step. The first readings are
-    omitted, because the filter of a quiet sensor has not settled.
+    If most spikes of an axis have the size of the same power of two, a bit flips. The noise includes vibration and is
+    at least half a step. The first readings of a window are omitted, because the sensor's filter has not settled.
     """
     half = step_counts / 2
     farthest, sizes = 0.0, [list[Array]() for _ in range(3)]
@@ -177,7 +177,7 @@ def _find_spikes(windows: Sequence[RawReadings], step_counts: Array) -> tuple[fl
 
 
 def _find_scatter_around(deviations: Array) -> Array:
-    """Return the scatter (n, 3) of the readings near each reading; within a burst of vibration it is large."""
+    """Return for each reading the scatter (n, 3) of the readings around it, which is large in a burst of vibration."""
     sizes = np.pad(np.abs(deviations), ((BURST_READINGS, BURST_READINGS), (0, 0)), mode="reflect")
     around = np.lib.stride_tricks.sliding_window_view(sizes, 2 * BURST_READINGS + 1, axis=0)
     scatter: Array = MAD_TO_STD * median(around)
@@ -194,9 +194,9 @@ def _is_one_bit(powers: Array) -> bool:
 
 
 def _skewness(windows: Sequence[RawReadings], axes: NDArray[np.bool_], critical_value: float) -> tuple[float, float]:
-    """Return the largest skewness, which bit errors cause, of the noise at rest of the `axes`, and its limit.
+    """Return the largest skewness of the noise of any of the `axes`, and its limit; bit errors make noise skewed.
 
-    Readings in motion are not used, because the arm's vibration may be skewed.
+    The `windows` are at rest, because vibration of a moving arm may be skewed.
     """
     parts = [window.residual_counts / np.maximum(window.residual_counts.std(axis=0), 0.5) for window in windows]
     noise = np.concatenate(parts)
@@ -216,14 +216,14 @@ def _longest_run(counts: NDArray[np.int64]) -> int:
 
 
 def _count_repeated(counts: NDArray[np.int64]) -> int:
-    """Count the sequences of readings that repeat an earlier sequence."""
+    """Count the sequences of `PATTERN_READINGS` consecutive readings that repeat an earlier sequence."""
     patterns = np.lib.stride_tricks.sliding_window_view(counts.astype(np.int16), PATTERN_READINGS, axis=0)
     rows = np.ascontiguousarray(patterns.reshape(len(patterns), -1))
     return len(rows) - len(np.unique(rows.view(f"V{rows.shape[1] * 2}")))
 
 
 def _count_heaped(counts: NDArray[np.int64], critical_value: float) -> int:
-    """Count the readings at the limit of an axis' range; 0 unless they outnumber the readings at the adjacent value."""
+    """Count the readings at an axis' extreme values, if they clearly outnumber those at the adjacent value."""
     heaped = 0
     for axis in counts.T:
         values, often = np.unique(axis, return_counts=True)

@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class DetectionLimit:
-    """The `size` of the fault `what`, in `unit`, that the check `check` detects in 95 of 100 recordings.
+    """The smallest `size` of the fault `what`, in `unit`, that the check `check` detects in 95 of 100 recordings.
 
-    `size` is infinite if the check detects no size. `off_by_expanded`: the largest error of scale factor or bias that a
-    fault just below `size` causes, divided by the stated U; None if not computed, or if the fault prevents a solution.
+    `size` is infinite if the check detects no size. `off_by_expanded` is the largest error of a scale factor or bias
+    due to a fault of this size, divided by U; None if not computed, or if there is no solution with the fault.
     """
 
     what: str
@@ -38,7 +38,7 @@ class DetectionLimit:
 def find_gyroscope_limits(
     sizes: Mapping[str, float], name: str, result: "SensorResult", environment: MeasurementEnvironment
 ) -> Iterator[DetectionLimit]:
-    """Yield the detection limits of the gyroscope `name`; `sizes`: minimal detectable sizes by fault mode."""
+    """Yield the detection limits of the gyroscope `name`, from the minimal detectable `sizes` by fault mode."""
     explained = result.explained
     if explained is None:
         return
@@ -54,7 +54,7 @@ def find_gyroscope_limits(
 
 
 def find_reference_limits(sizes: Mapping[str, float], quantity: Quantity) -> tuple[DetectionLimit, ...]:
-    """Return the detection limits of readings of a reference, from the minimal detectable `sizes` by fault mode."""
+    """Return detection limits of an accelerometer or magnetometer, from minimal detectable `sizes` by fault mode."""
     from rig.analysis.consistency.reference_alternatives import FAULT_MODES as REFERENCE_FAULT_MODES
 
     return tuple(
@@ -65,7 +65,7 @@ def find_reference_limits(sizes: Mapping[str, float], quantity: Quantity) -> tup
 
 
 def _means_of_solve(explained: VectorFit) -> Means:
-    """Return the means of the solution: modelled rates along the sensor's axes, windows, and sweeps."""
+    """Return the means from which the solution was estimated: modelled rates along the sensor's axes, times, sweeps."""
     inputs_of_solve = explained.inputs
     turns = np.flatnonzero(inputs_of_solve.turns_rad_s.any(axis=1))
     sweep = np.full(len(inputs_of_solve.turns_rad_s), REST)
@@ -74,10 +74,11 @@ def _means_of_solve(explained: VectorFit) -> Means:
 
 
 def _error_over_expanded(patterns: Array, explained: VectorFit, mounting: Array, inputs: UnknownErrors) -> float | None:
-    """Return the error of a result, divided by U, due to the worst of the fault's `patterns` (k, N, 3).
+    """Return the largest error of a scale factor or bias, divided by its U, due to the worst of `patterns` (k, N, 3).
 
-    The means are solved again with the fault, which may also look like bias drift and increase U. Return None if there
-    is no solution with the fault.
+    Each pattern is an effect of the fault on the means. The means are solved again with the worst one added, and U is
+    that of this solution, because the fault may look like bias drift and increase U. Return None if there is no
+    solution.
     """
     solution, inputs_of_solve = explained.solution, explained.inputs
     response = np.einsum("qni,kni->kq", solution.response, patterns) / np.sqrt(np.diag(solution.covariance))

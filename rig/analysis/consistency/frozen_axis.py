@@ -35,9 +35,9 @@ def find_longest_frozen(recording: ObservedRun, name: str) -> int:
 
 
 def _rate_change(recording: ObservedRun, time_s: Array, axis: Array) -> float:
-    """Return the change of the rate along an axis (3,) of the flange over times (n,), rad/s.
+    """Return the range, rad/s, of the flange's rate about an `axis` (3,) at the times (n,).
 
-    Rates are averaged over `SMOOTHING_S`, because the noise of times would dominate the rate between two states.
+    Rates are averaged over `SMOOTHING_S`, because errors of the states' times make single rates too noisy.
     """
     covered_s = time_s[recording.motion.covered(time_s)] if len(time_s) else time_s
     if len(covered_s) < MIN_EQUAL_READINGS:

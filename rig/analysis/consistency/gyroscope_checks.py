@@ -9,10 +9,10 @@ Each check tests the columns of one fault. Without the fault, the χ² that the 
 freedom as there are columns. The bias process is estimated from residuals within sweeps and between rests, so that a
 disturbed sweep does not mask itself.
 
-A ripple faster than readings and states affects the transfers' mean readings but no rates, and looks like noise unless
-it is synchronous with the samples. So the unexplained variance of transfers is inflated by their Birge ratio, after a
-fit of all changes from quarter to quarter. A transfer that still is an outlier gets a mean of its own, so that it does
-not affect the tests.
+A ripple of the arm's rate that is faster than the samples and states may shift the mean reading of a transfer, although
+the recorded states do not show it. So the unexplained variance of the transfers is inflated until their residuals agree
+with it, after a fit of all changes from quarter to quarter of the recording. A transfer that still is an outlier gets a
+mean of its own, so that it does not affect the tests.
 """
 
 from collections.abc import Iterator, Sequence
@@ -78,8 +78,8 @@ class ErrorPatterns:
     """The known errors of N segments. A pattern is the change of the readings by one standard deviation of one error.
 
     - `patterns_rad_s` (P, N, 3): all patterns; `encoders_rad_s` (E, N, 3): only those of encoder errors in arcs.
-    - `transfers`: M segments, the N segments first and then the transfers; `transfer_patterns_rad_s` (Q, M, 3): the
-      patterns of the M segments.
+    - `transfers`: the N segments followed by the transfers, M segments in all; `transfer_patterns_rad_s` (Q, M, 3): the
+      patterns of these M segments.
     - `instability_rad_s`: the sensor's bias instability, 0 if unknown.
     """
 
@@ -109,8 +109,9 @@ def check_gyroscope(
 ) -> TestResults:
     """Return the tests of a gyroscope's model against each alternative, the outlying sweeps, and the detection limits.
 
-    Faults that persist (`changes`) are tested on the segments and the transfers between them, `differences` on the
-    segments alone. Each test has the given false-alarm probability; `matrix` (3, 3) is the gyroscope's.
+    Lasting changes are tested on the `segments` and the transfers between them, all other faults on the segments alone.
+    Each test has the given false-alarm probability. `matrix` (3, 3) is the gyroscope's; `allowance` contains the known
+    errors, which no test may take for a fault, and the transfers.
     """
     segments = _steady_rates(segments, matrix)
     allowance = replace(allowance, transfers=_steady_rates(allowance.transfers, matrix))
@@ -152,10 +153,10 @@ def check_gyroscope(
 
 
 def _steady_rates(segments: Segments, matrix: Array) -> Segments:
-    """Return the segments with the mean rate of each sweep, and with the deviations from it removed from the readings.
+    """Return the segments with the rate of each replaced by its sweep's mean rate, and with readings to match.
 
-    The tested columns contain the rates. With the rates of single segments, they would contain the same encoder noise
-    as the residuals, and would explain this part of the residuals.
+    The tested columns are made from the rates. The rates of single segments contain encoder noise, which is in the
+    residuals too, so that the columns would explain this part of the residuals.
     """
     rates = segments.rates_rad_s.copy()
     for sweep in distinct(segments.sweep[segments.sweep > REST]):
@@ -187,12 +188,11 @@ def _free_disturbed_transfers(
     bias: BiasProcess,
     false_alarm_probability: float,
 ) -> tuple[_TestedSegments, Statistic | None]:
-    """Return the result of `_inflate_transfers` with a separate mean for each outlying transfer, and the axis test.
+    """Return the segments with transfers, of which outlying ones have a mean of their own, and the axis test.
 
-    The axis test is the statistic of a change of one axis's scale factor, None if the model contains it. A ripple at
-    the data rate shifts the mean of one transfer. A change of scale factors or of the mounting shifts all later
-    transfers, so a transfer is an outlier only if its own mean explains clearly more of the residuals than any such
-    change.
+    The axis test is the statistic of a change of one axis's scale factor, None if the model contains such a change. A
+    ripple at the data rate shifts the mean of one transfer, a change of the sensor those of all later transfers. So a
+    transfer is an outlier only if its own mean explains clearly more of the residuals than any such change.
     """
     disturbed: list[int] = []
     while True:
@@ -215,10 +215,10 @@ def _free_disturbed_transfers(
 def _inflate_transfers(
     segments_only: _TestedSegments, matrix: Array, allowance: ErrorPatterns, bias: BiasProcess, disturbed: Sequence[int]
 ) -> _TestedSegments:
-    """Return the result of `_whiten_with_transfers`, with the transfers' variance inflated until χ² is at most its dof.
+    """Return the segments with transfers, whose unexplained variance is inflated until their χ² is at most its dof.
 
-    The transfers' χ² and dof are those of segments with transfers minus those of segments alone. The factor on their
-    unexplained variance is at most `MAX_RIPPLE_INFLATION`.
+    The transfers' χ² and dof are those of segments with transfers minus those of segments alone. The factor on the
+    variance is at most `MAX_RIPPLE_INFLATION`. Each `disturbed` transfer has a mean of its own.
     """
     transfers, (segments_chi_square, segments_dof) = allowance.transfers, _residual_chi_square(segments_only)
     with_transfers = _whiten_with_transfers(matrix, allowance, bias, disturbed)
@@ -236,8 +236,7 @@ def _inflate_transfers(
 def _residual_chi_square(tested: _TestedSegments) -> tuple[float, int]:
     """Return the residuals' χ² after a fit of the model and of all tested changes, and its degrees of freedom.
 
-    If transfers are absent, some changes differ from the model's effects only by the rates' noise; such changes are
-    dropped.
+    Changes that the model contains, except for the rates' noise, are not fitted; without transfers there are some.
     """
     changed = [*changes(tested.segments, tested.axis_rates).values(), quarter_columns(tested.means)]
     columns = [apply_whitener(tested.model.whitener, change) for change in changed]
@@ -249,7 +248,7 @@ def _residual_chi_square(tested: _TestedSegments) -> tuple[float, int]:
 def _whiten_with_transfers(
     matrix: Array, allowance: ErrorPatterns, bias: BiasProcess, disturbed: Sequence[int] = ()
 ) -> _TestedSegments:
-    """Return the tested segments: the sweeps' and rests' segments and the transfers between them, in a whitened model.
+    """Return the segments of sweeps and rests and the transfers between them, with their whitened model.
 
     In this model each `disturbed` transfer has a mean of its own.
     """
@@ -306,11 +305,11 @@ def _detection_limits(
 def _test_bias_jump(
     segments: Segments, axis_rates: Array, scatter: Scatter, false_alarm_probability: float
 ) -> Statistic | None:
-    """Return the χ² of the largest bias jump between two rests, beyond drift; None with fewer than three rests.
+    """Return the χ² of the largest bias jump between two rests, beyond drift, and its critical value.
 
-    The drift is re-estimated with the best jump in the model, because otherwise the drift would contain the jump. Few
-    rests determine the drift poorly, so the critical value is from the F distribution, with one degree of freedom per
-    possible jump. Simulated random walks exceed this value about as often as the false-alarm probability states.
+    Return None with fewer than two possible jumps, each at the end of a sweep between rests. Few rests determine the
+    drift poorly, so the critical value is from the F distribution, with one degree of freedom per possible jump.
+    Simulated random walks exceed this value about as often as the false-alarm probability states.
     """
     steady_columns, steps = _steady_columns(segments), step_columns(segments)
     if len(steps) < 2:
@@ -334,6 +333,7 @@ def _test_bias_jump(
         range(len(steps)),
         key=lambda k: float(np.sum((step_residuals[k].T @ residuals) ** 2 / np.sum(step_residuals[k] ** 2))),
     )
+    # The bias process is estimated with the best jump in the model, because otherwise its drift would contain the jump.
     nuisance = orthonormal_basis(np.column_stack([steady_columns, steps[best]]))
     return explain_step(steps[best], nuisance), _jump_critical_value(len(steps), false_alarm_probability)
 
@@ -348,7 +348,7 @@ def _jump_critical_value(jumps: int, false_alarm_probability: float) -> float:
 def _estimate_bias_process(
     segments: Segments, axis_rates: Array, steady_columns: Array, scatter: Scatter
 ) -> BiasProcess:
-    """Return the bias process in the residuals of a fit of the orthonormal `steady_columns` (N, k)."""
+    """Return the bias process, estimated from the residuals after a fit of the orthonormal `steady_columns` (N, k)."""
     return bias_process(
         steady_columns,
         segments.means_rad_s - axis_rates,
@@ -366,6 +366,9 @@ def _build_scatter(segments: Segments, patterns_rad_s: Array, allowance: ErrorPa
 
 
 def _steady_columns(segments: Segments, *more: Array) -> Array:
-    """Return orthonormal columns (N, k): a level of each sweep and of all rests, gravity, steady drift, and `more`."""
+    """Return an orthonormal basis (N, k) of these effects: a level of each sweep and of all rests, gravity, and drift.
+
+    The drift is steady. The columns `more` are added before the basis is formed.
+    """
     levels = [segments.sweep == sweep for sweep in distinct(segments.sweep)]
     return orthonormal_basis(np.column_stack([*levels, segments.gravity_m_s2, normalise_time(segments), *more]))

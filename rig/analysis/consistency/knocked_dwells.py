@@ -16,12 +16,10 @@ MIN_HALF_READINGS = 20  # fewer do not show how their mean scatters
 def compare_dwell_halves(
     dwells: Sequence[RawDwell], flicker_counts: float, false_alarm_probability: float, steps: Steps
 ) -> Mapping[str, Statistic]:
-    """Return by check the largest difference between a long dwell's halves, as χ² of three axes, and its limit.
+    """Return, under the check's name, the largest difference between the halves of a dwell, and its limit.
 
-    The limit is a quantile of the F distribution, because the noise is estimated from the dwells' readings. Flicker
-    with the Allan deviation `flicker_counts` makes the halves differ by √2 times this deviation. A slow oscillation
-    that no encoder measures affects every dwell, a knock only one dwell, so the mean square of the other dwells'
-    differences is added to the variance, with degrees of freedom by Welch–Satterthwaite. `steps`: the steps of the
+    The difference is the χ² of three axes. Short dwells are not tested; if all are short, there is no check.
+    `flicker_counts` is the Allan deviation of the bias' flicker, by which halves also differ; `steps` are those of the
     counts.
     """
     from scipy.special import fdtri
@@ -33,6 +31,9 @@ def compare_dwell_halves(
     differences, variances = (np.array(part) for part in zip(*halves, strict=True))
     # One noise for all dwells: in a single dwell, half a cycle of an oscillation looks like coloured noise, which would
     # explain a step as well.
+    # Flicker makes the halves differ by √2 times its Allan deviation. A slow oscillation that no encoder measures
+    # affects every dwell, a knock only one. So the mean square of the other dwells' differences is added to the
+    # variance, and dof follow from Welch–Satterthwaite. The noise is estimated, so the limit is a quantile of F.
     noise = np.median(variances, axis=0) + 2 * flicker_counts**2
     swing = _vibration_variances(differences, noise)
     dof_of_noise = min(len(dwell.counts) for dwell in long_dwells) - 2
@@ -45,7 +46,7 @@ def compare_dwell_halves(
 
 
 def _vibration_variances(differences: Array, noise: Array) -> Array:
-    """Return for each of N dwells the mean square of the other dwells' `differences` (N, 3), minus the `noise` (3,)."""
+    """Return for each of N dwells the other dwells' mean square of `differences` (N, 3), minus the `noise` (3,)."""
     beyond = (differences**2 - noise).mean(axis=1)
     others: Array = np.maximum((beyond.sum() - beyond) / max(len(beyond) - 1, 1), 0.0)
     return others

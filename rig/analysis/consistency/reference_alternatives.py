@@ -1,6 +1,7 @@
-"""Possible faults of readings of a constant reference: the tested alternatives, and fault modes of a given size.
+"""Possible faults of readings of a constant reference: the columns that checks test, and realistic fault modes.
 
-This is the counterpart of `rig.analysis.consistency.alternatives` for accelerometers and magnetometers.
+This is the counterpart of `rig.analysis.consistency.alternatives` for accelerometers and magnetometers, whose reference
+is gravity or the Earth's magnetic field.
 """
 
 from collections.abc import Callable
@@ -17,9 +18,9 @@ from rig.estimation.reference.reference_model import REFERENCE, matrix
 
 @dataclass(frozen=True, slots=True)
 class ReferenceModel:
-    """The model of readings in a constant reference: the parameters `theta` (22,), estimated from the `movement`.
+    """The readings of a `movement` in a constant reference, and the parameters `theta` (22,) estimated from them.
 
-    The K = N + 3 M readings are those of N dwells, then the mean, cosine and sine of M sweeps.
+    There are K = N + 3 M vector readings: one of each of N dwells, then the mean, cosine and sine of each of M sweeps.
 
     - `error_patterns` (P, 3 K): the effects of one standard uncertainty of each of P known, independent errors.
     - `times_s` (N + M,): the middles of the dwells' and sweeps' windows.
@@ -44,7 +45,10 @@ class ReferenceModel:
 
 
 def alternatives(model: ReferenceModel) -> Alternatives:
-    """Return every alternative's effects (3 K, k) on readings, by the check's name; None stands for all residuals."""
+    """Return the effects (3 K, k) of each possible fault on the readings, by the name of its check.
+
+    The check `residuals` has None instead of effects, because it tests all residuals.
+    """
     s, f, time = find_force(model.theta, model.movement), matrix(model.theta), _time(model)
     columns: dict[str, Array | None] = {
         "bias_changed": bias_drift_columns(model),
@@ -61,7 +65,7 @@ def alternatives(model: ReferenceModel) -> Alternatives:
 
 
 def segment_columns(model: ReferenceModel, segment: int) -> Array:
-    """Return the columns (3 K, 3 or 9) by which the readings of one dwell or sweep may differ from the model."""
+    """Return columns (3 K, 3 or 9), which let all readings of one dwell or sweep differ from the model."""
     first, wide = (3 * segment, 3) if segment < model.dwells else (3 * model.dwells + 9 * (segment - model.dwells), 9)
     columns = np.zeros((model.movement.readings().size, wide))
     columns[first : first + wide] = np.eye(wide)
@@ -74,20 +78,20 @@ def bias_drift_columns(model: ReferenceModel) -> Array:
 
 
 def _time(model: ReferenceModel) -> Array:
-    """Return the normalised times (K,) of the segments' middles, from −1 to 1."""
+    """Return the middle time (K,) of the dwell or sweep of each reading, scaled linearly to range from −1 to 1."""
     middle = repeat_by_segment(model.times_s, model.movement)
     time: Array = (2 * middle - middle.max() - middle.min()) / np.ptp(middle)
     return time
 
 
 def _half_step(model: ReferenceModel) -> Array:
-    """Return a step (K, 1) half-way through the recording, about its mean: −½ before, ½ after."""
+    """Return a step (K, 1) half-way through the recording: −½ for readings before it, ½ after it."""
     middle = (model.times_s.min() + model.times_s.max()) / 2
     return repeat_by_segment(np.where(model.times_s > middle, 0.5, -0.5), model.movement)[:, None]
 
 
 def _dwell_columns(model: ReferenceModel) -> Array:
-    """Return the columns (3 K, 3 N) by which each axis' reading in each dwell may differ from the model."""
+    """Return columns (3 K, 3 N), each of which changes the reading of one axis in one dwell by one unit."""
     count = 3 * model.dwells
     return np.eye(model.movement.readings().size)[:, :count]
 
@@ -99,9 +103,9 @@ def _axis_components(model: ReferenceModel) -> Array:
 
 
 def _bend_pattern(change: Callable[[Array], Array]) -> Callable[[ReferenceModel], Array]:
-    """Return a function from a model to the patterns of an error of each axis that depends on the force along it.
+    """Return the `patterns` of a `FaultMode` in which the error of an axis depends on the force along this axis.
 
-    `change` takes this force and returns the error, both as multiples of the reference.
+    `change` takes this force and returns the error, both as multiples of the reference's norm.
     """
 
     def patterns(model: ReferenceModel) -> Array:

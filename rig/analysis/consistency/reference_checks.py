@@ -36,10 +36,11 @@ from rig.estimation.reference.shared_errors import decorrelate, information
 
 @dataclass(frozen=True, slots=True)
 class WhitenedReference:
-    """Residuals (n,) and `model` columns (n, q) with unit noise, in coordinates in which all errors are independent.
+    """Residuals (n,) and `model` columns (n, q), in coordinates in which all errors are independent.
 
-    `rotation` (n, n) maps readings to these coordinates. `growth` (n,) is the increase of the residuals' variance with
-    δ², the arm's attitude error squared (`rig.estimation.reference.shared_errors`).
+    Noise has variance 1 in these coordinates, and `rotation` (n, n) maps readings to them. If the arm's attitudes err
+    by the standard deviation δ, the variances of the residuals are 1 + δ² `growth` (n,)
+    (`rig.estimation.reference.shared_errors`).
     """
 
     residuals: Array
@@ -50,7 +51,8 @@ class WhitenedReference:
     def chi_square_of(self, alternatives: Sequence[Array], nuisance: Sequence[Array]) -> list[float]:
         """Return the χ² of each alternative, as `WhitenedModel` defines it.
 
-        The arm's attitude error is estimated with the likeliest alternative in the model.
+        The arm's attitude error is estimated after the likeliest alternative is added to the model, because otherwise
+        a fault would look like a large attitude error.
         """
         model = self._extend_model(nuisance)
         rotated = [self.rotation @ columns for columns in alternatives]
@@ -64,12 +66,12 @@ class WhitenedReference:
     def test(
         self, columns: Array | None, nuisance: Sequence[Array], false_alarm_probability: float
     ) -> Statistic | None:
-        """Return the likelihood-ratio statistic of the columns, and the critical value.
+        """Return the likelihood-ratio statistic of the columns, and its critical value.
 
-        The statistic is twice the logarithm of the ratio, which would be χ² for a given attitude error δ of the arm.
-        The likelihoods with and without the columns each have their own restricted maximum-likelihood δ (Welham and
-        Thompson, J. R. Stat. Soc. B 59 (1997) 701). The larger the part of the variance due to δ, the closer is the
-        critical value to a quantile of F instead of χ². If `columns` is None, the statistic is the χ² of all residuals.
+        The statistic is twice the logarithm of the ratio of the likelihoods with and without the columns; each
+        likelihood has its own restricted maximum-likelihood estimate of the arm's attitude error δ (Welham and
+        Thompson, J. R. Stat. Soc. B 59 (1997) 701). If `columns` is None, the statistic is the χ² of all residuals.
+        Return None if the model already explains all that the columns can.
         """
         from scipy.special import chdtri
 
@@ -88,7 +90,10 @@ class WhitenedReference:
     def minimal_detectable_size(
         self, fault_patterns: Array, alternatives: Sequence[Array], false_alarm_probability: float
     ) -> float:
-        """Return the minimal size of a fault, with `fault_patterns` (n, k) per unit, that `alternatives` detect."""
+        """Return the smallest size of a fault that a test of one of the `alternatives` detects.
+
+        `fault_patterns` (n, k) are the changes of the readings by one unit of the fault.
+        """
         model = self._extend_model(())
         delta_rad = self._estimate_delta(model)
         size = np.sqrt(1 + delta_rad**2 * self.growth)[:, None]
@@ -106,6 +111,8 @@ class WhitenedReference:
         """Return the critical value of the test for the orthonormal columns `new`, which the model does not contain."""
         from scipy.special import chdtri, fdtri
 
+        # With δ known, the statistic is χ²; with δ estimated from few residuals, it follows from an F variable. The
+        # critical value lies between the two, in proportion to the part of the variance that is due to δ.
         count = new.shape[1]
         chi_square_limit, dof = (
             float(chdtri(count, false_alarm_probability)),
@@ -150,7 +157,7 @@ class WhitenedReference:
 
 
 def check_reference(readings: ReferenceModel, false_alarm_probability: float, *, drifting: bool = False) -> TestResults:
-    """Return every statistic with its critical value; if `drifting`, the bias may change steadily."""
+    """Return every statistic with its critical value; if `drifting`, a steady drift of the bias is no fault."""
     whitened, columns_by_name = _whiten_readings(readings, drifting=drifting), alternatives(readings)
     segments = range(readings.dwells + readings.sweeps)
     ranked = find_outliers(

@@ -39,9 +39,9 @@ DISTURBED_DWELL = "disturbed_dwell"
 
 @dataclass(frozen=True, slots=True)
 class SegmentName:
-    """The check's name `what`, and the index in the plan of the `sweep` or `dwell` that contradicts the others.
+    """The name `what` of a check of one sweep or dwell, and the plan's index of this `sweep` or `dwell`.
 
-    If all sweeps and dwells agree, the name stands for the worst of them, and both indices are None.
+    Both indices are None in the name of the single check that is made if all sweeps and dwells agree.
     """
 
     what: str
@@ -50,17 +50,17 @@ class SegmentName:
 
 
 def _name_dwell(index: int) -> SegmentName:
-    """Return the name of a disturbed dwell."""
+    """Return the name of the check of the dwell with this index in the plan."""
     return SegmentName(DISTURBED_DWELL, dwell=index)
 
 
 @dataclass(frozen=True, slots=True)
 class ReferenceReadings:
-    """One sensor's readings: `counts` (n, 3) by recording, raw `dwells` and `sweeps`, and the `model`.
+    """One sensor's readings: all `counts` (n, 3) of each recording, raw `dwells` and `sweeps`, and the fitted `model`.
 
-    - `segments`: the dwells and sweeps of `model`, in its order.
+    - `segments`: the names of the checks of the dwells and sweeps in `model`, in its order.
     - `flicker_counts`: the Allan deviation of the bias' flicker, which makes the halves of a dwell differ.
-    - `digits`: see `judge_readings`.
+    - `digits`: the resolution of the counts.
     """
 
     counts: Sequence[NDArray[np.int64]]
@@ -76,8 +76,9 @@ class ReferenceReadings:
 class ReferenceStatistics:
     """The statistics of a sensor with their critical values, and the detection limits by fault mode.
 
-    `segments`: the dwells and sweeps that contradict the others, or only the worst one if all agree, each with its
-    statistic; `statistics`: all other statistics, by the check's name.
+    - `segments`: the check and statistic of each dwell or sweep that contradicts the others; if all agree, only those
+      of the worst one.
+    - `statistics`: all other statistics, by the check's name.
     """
 
     segments: list[tuple[SegmentName, Statistic]]
@@ -88,7 +89,7 @@ class ReferenceStatistics:
 def read_accelerometer(
     name: str, recordings: Sequence[ObservedRun], result: "AccelerometerResult", uncertainty: Uncertainty
 ) -> ReferenceReadings:
-    """Return an accelerometer's readings in a run, in the order of its solution, given the stated `uncertainty`."""
+    """Return an accelerometer's readings in a run; the stated `uncertainty` gives the sizes of the known errors."""
     matrix = result.solution.matrix
     dwells = [dwell for recording in recordings for dwell in raw_acceleration_dwells(name, recording, matrix)]
     segments = list_windows(name, recordings, result.dwells)
@@ -125,7 +126,7 @@ def read_accelerometer(
 def read_magnetometer(
     name: str, recordings: Sequence[ObservedRun], result: "MagnetometerResult", uncertainty: Uncertainty
 ) -> ReferenceReadings:
-    """Return a magnetometer's readings in the dwells of a run; its sweeps are not used."""
+    """Return a magnetometer's readings in the dwells of a run; readings in sweeps are not used."""
     solution, movement = result.solution, Movement(result.measurements, NO_SWEEPS)
     channel = result.sensor.channel(FIELD)
     dwells = [dwell for recording in recordings for dwell in raw_field_dwells(name, recording)]

@@ -28,8 +28,9 @@ Alternatives = Mapping[str, Array | None]  # by the check's name; None: all resi
 class FaultMode(Generic[Subject]):
     """A possible fault `what`, the `check` that detects it, and the `unit` of its size, None for the readings' unit.
 
-    `patterns` returns the changes of the readings by one unit of the fault, a column for each form that it may have. A
-    change half-way through the recording is given a zero mean, because the calibration would absorb any mean.
+    `patterns` returns the changes of the readings by one unit of the fault: a column for each form that it may have,
+    such as on each axis. A change half-way through the recording is −½ before and ½ after, because the calibration
+    would absorb a mean.
     """
 
     what: str
@@ -40,10 +41,10 @@ class FaultMode(Generic[Subject]):
 
 @dataclass(frozen=True, slots=True)
 class TestResults:
-    """The statistics of one sensor by the name of their check, each with its critical value.
+    """The `statistics` of one sensor by the name of their check, each with its critical value.
 
-    - `worst`: the statistic of the segment that differs most from the others.
-    - `disturbed`: the statistics of all outlying segments, by index.
+    - `worst`: the statistic of the sweep or dwell that differs most from the others.
+    - `disturbed`: the statistics of all outlying sweeps or dwells, by index.
     - `detection_limits`: the minimal detectable sizes by fault mode, empty if not computed.
     """
 
@@ -62,9 +63,10 @@ class WhitenedModel(Protocol):
     def test(
         self, columns: Array | None, nuisance: Sequence[Array], false_alarm_probability: float
     ) -> Statistic | None:
-        """Return the χ² that `columns` explain, and its critical value for this false-alarm probability.
+        """Return the χ² that `columns` explain after a fit of the model and the `nuisance`, and its critical value.
 
-        Return None if the model and the `nuisance` columns already explain all that `columns` can.
+        If `columns` is None, the χ² is that of all residuals. Return None if the fit already explains all that
+        `columns` can.
         """
 
 
@@ -81,8 +83,9 @@ def find_outliers(
 ) -> list[tuple[int, Statistic]]:
     """Return the outlying segments with their statistics, or the worst segment alone if all segments agree.
 
-    Outliers are removed one by one until the remaining segments agree or half of all are removed. If only two segments
-    determine a parameter, either may be the outlier, so both are returned.
+    `columns` returns the effects by which one segment may differ from the model. Outliers are removed one by one until
+    the remaining segments agree or half of all are removed. If only two segments determine a parameter, either may be
+    the outlier, so both are returned.
     """
     remaining, nuisance = list(segments), list[Array]()
     outliers = list[tuple[int, Statistic]]()
@@ -109,7 +112,10 @@ def orthonormal_basis(columns: Array) -> Array:
 
 
 def remaining_directions(model_basis: Array, columns: Array) -> Array:
-    """Return an orthonormal basis (n, k) of the part of columns outside an orthonormal `model_basis` (n, p)."""
+    """Return an orthonormal basis (n, k) of the parts of `columns` that are orthogonal to `model_basis` (n, p).
+
+    `model_basis` is orthonormal. Columns that lie almost in its span are dropped.
+    """
     sizes = np.linalg.norm(columns, axis=0)
     new = columns / np.where(sizes > 0, sizes, 1.0)
     new = new - model_basis @ (model_basis.T @ new)
@@ -121,11 +127,10 @@ def remaining_directions(model_basis: Array, columns: Array) -> Array:
 def chi_square_of(readings: Array, model_basis: Array, columns: Array | None) -> tuple[float, int]:
     """Return the χ² of readings (n,) that columns (n, k) explain after a fit of the model, and its dof.
 
-    `model_basis` (n, p) is orthonormal. If `columns` is None, the χ² is that of all residuals. It is then computed
-    without a decomposition, which would be slow and might not converge.
+    `model_basis` (n, p) is orthonormal. If `columns` is None, the χ² is that of all residuals.
     """
     unexplained = readings - model_basis @ (model_basis.T @ readings)
-    if columns is None:
+    if columns is None:  # without a decomposition, which would be slow and might not converge
         return float(unexplained @ unexplained), len(readings) - model_basis.shape[1]
     new = remaining_directions(model_basis, columns)
     projections = new.T @ unexplained
@@ -133,14 +138,14 @@ def chi_square_of(readings: Array, model_basis: Array, columns: Array | None) ->
 
 
 def minimal_detectable_size(model_basis: Array, patterns: Array, alternatives: Iterable[Alternative]) -> float:
-    """Return the smallest fault that at least one test detects in 95 of 100 recordings; inf if none does.
+    """Return the smallest size of a fault that a test detects in 95 of 100 recordings; inf if no test detects any size.
 
     This is Baarda's minimal detectable bias (1968): under the fault a test's statistic is non-central χ². All arguments
     are whitened.
 
     - `model_basis` (n, p): orthonormal columns of the model.
-    - `patterns` (n, k): the readings due to a fault of size 1, with a column for each form that the fault may have. The
-      form that is detected worst decides.
+    - `patterns` (n, k): the changes of the readings by a fault of size 1, a column for each form of the fault. Each
+      form counts with the test that detects it best; the size is that of the form that needs the largest.
     - `alternatives`: the columns of each test, and the test's critical value as a function of their number.
     """
     from scipy.special import chndtrinc

@@ -18,7 +18,10 @@ TIME_TOLERANCE_S = 1e-5  # times that differ by more belong to different edges
 
 
 def build_time_patterns(segments: Segments, jitter_s: float) -> Array:
-    """Return the patterns (P, N, 3) rad/s of errors in the times at which one segment of a sweep follows another."""
+    """Return the patterns (P, N, 3) rad/s of errors of the times at the edges of a sweep's segments.
+
+    `jitter_s` is the standard deviation of these times. Each edge has one pattern.
+    """
     lengths = np.diff(segments.times_s)
     by_rate = jitter_s * segments.rates_rad_s / lengths
     effects = [
@@ -28,11 +31,11 @@ def build_time_patterns(segments: Segments, jitter_s: float) -> Array:
 
 
 def build_reading_patterns(segments: Segments, noise_rad: float) -> Array:
-    """Return the patterns (P, N, 3) rad/s of joint angles read with noise at the edges of sweeps and transfers.
+    """Return the patterns (P, N, 3) rad/s of noise of the joint angles at the edges of segments.
 
     In sweeps, only the vibrating joints are included, because the noise of the turning joint is part of the time
-    jitter, and joints at rest have no noise. In transfers all joints are included, because none turns at the ends. At
-    each edge, the joints have as many independent errors as their axes have directions: three at most.
+    jitter, and joints at rest have no noise. In transfers all joints are included, because none turns at the ends.
+    Each edge has one pattern for each independent direction of the axes of these joints, three at most.
     """
     lengths = np.diff(segments.times_s)
     patterns = []
@@ -54,7 +57,7 @@ def build_reading_patterns(segments: Segments, noise_rad: float) -> Array:
 
 
 def _edges(segments: Segments, sweep: int) -> Iterator[NDArray[np.float64]]:
-    """Yield an array (N,) for each edge of a sweep's segments: 1 for the segment that ends there, −1 for the next."""
+    """Yield an array (N,) for each edge of a sweep's segments: 1 for the one ending there, −1 for the next, else 0."""
     inside = segments.sweep == sweep
     times_s = np.sort(segments.times_s[inside].ravel())
     for time_s in times_s[np.append(True, np.diff(times_s) > TIME_TOLERANCE_S)]:

@@ -1,7 +1,7 @@
-"""The known systematic errors of arm and sensor in the segments of a recording: one pattern for each unknown.
+"""The known systematic errors of arm and sensor in the segments of a recording: one pattern for each error.
 
 A pattern is the effect of one standard deviation of one error on all readings, as in the model of common errors
-(`rig.estimation.gyroscope.common_errors`). Along the swept axis the arm errs only by clock, encoders and times.
+(`rig.estimation.gyroscope.common_errors`). The arm's rate about the swept axis errs only by clock, encoders and times.
 """
 
 from collections.abc import Sequence
@@ -44,10 +44,10 @@ TRANSFER_STEPS = 24  # directions count as constant within one
 
 @dataclass(frozen=True, slots=True)
 class NonlinearityPrior:
-    """The prior of a sensor's nonlinearity, which has a part with the rate's cube and a part with its square.
+    """The prior of a sensor's nonlinearity, one part of which grows as the rate's cube, the other as its square.
 
-    `cube`, `square`: the parts' standard deviations at full scale, as fractions of full scale. If `free`, the
-    nonlinearity is unknown, and may have a kink at zero.
+    `cube` and `square` are the standard deviations of these parts at full scale, as fractions of full scale. If `free`,
+    they are not used: the nonlinearity is unknown, and may have a kink at zero.
     """
 
     cube: float
@@ -92,9 +92,9 @@ def collect_known_errors(
 ) -> KnownErrors:
     """Return the standard uncertainties of gyroscope and arm, from the configuration and the recording.
 
-    A solution at several speeds estimates the nonlinearity, so its stated value is not used. A solution at one speed
-    has one scale factor for both directions, so only the part that is even in the rate is used. `stamp_std_s` is as in
-    `RecordedSensor`.
+    If the solution estimates the nonlinearity, as at several speeds, the nonlinearity counts as unknown, and the
+    configuration's value is not used. `stamp_std_s` is the standard deviation of the time stamps of the samples, None
+    if unknown.
     """
     sensor, explained = result.sensor, result.explained
     return build_known_errors(
@@ -126,7 +126,11 @@ def build_known_errors(
     temperature_times_s: Array,
     stamp_s: float = 0.0,
 ) -> KnownErrors:
-    """Return the standard uncertainties of all modelled error sources of gyroscope `name` with the given full scale."""
+    """Return the standard uncertainties of all modelled error sources of gyroscope `name` with the given full scale.
+
+    `finds_curve`: whether the solution estimates the nonlinearity; `arcs`: whether any sweep is an arc, not a whole
+    turn. The other keywords are as in `KnownErrors`.
+    """
     steady = np.array([angle.startswith(("twist", "zero")) for angle in ANGLE_ERRORS])
     cube, square = (uncertainty.find_stated_size(what, name) / 100 / np.sqrt(3) for what in NONLINEARITY_KEYS)
     return KnownErrors(
@@ -149,7 +153,8 @@ def build_error_patterns(
 ) -> ErrorPatterns:
     """Return the patterns of known errors in the means of a sensor with matrix F (3, 3).
 
-    In transfers, which are faster than sweeps, the even part of the nonlinearity counts as unknown.
+    `transfers` are `segments` followed by the transfers between them. In their patterns the even part of the
+    nonlinearity counts as unknown, because transfers are faster than sweeps.
     """
     on_transfers = replace(known_errors, curve=replace(known_errors.curve, square=1.0))
     instability_rad_s = 0.0 if known_errors.sensor is None else known_errors.sensor.instability_rad_s
@@ -163,7 +168,7 @@ def build_error_patterns(
 
 
 def _earth(environment: MeasurementEnvironment, name: str, earth_rate: "EarthRate | None") -> Array:
-    """Return the uncertainty of the Earth's rate as k independent vectors of one standard deviation, (3, k), rad/s."""
+    """Return the uncertainty of the Earth's rate as k independent errors (3, k), rad/s, of one standard deviation."""
     unknown = list_uncertainties(environment, name, earth_rate)
     if unknown.earth_covariance_rad2_s2 is not None:
         size, directions = np.linalg.eigh(unknown.earth_covariance_rad2_s2)
@@ -172,7 +177,7 @@ def _earth(environment: MeasurementEnvironment, name: str, earth_rate: "EarthRat
 
 
 def unknown_earth_rate(*, is_known: bool) -> Array:
-    """Return the columns (3, k) of an unknown Earth's rate, rad/s, for `KnownErrors`; k = 0 if the rate is known."""
+    """Return `KnownErrors.earth_rad_s` (3, k) for an unknown Earth's rate; k = 0 if the rate is known."""
     return np.asarray(EARTH_RATE_RAD_S / np.sqrt(3) * np.eye(3)[:, : 0 if is_known else 3], dtype=np.float64)
 
 
@@ -226,9 +231,10 @@ def _angle_patterns(segments: Segments, known_errors: KnownErrors) -> Array:
 
 
 def _encoder_patterns(segments: Segments, encoder_rad: float) -> Array:
-    """Return the patterns of encoder errors at each angle where arcs begin or end.
+    """Return the patterns of encoder errors, one for each angle of a joint at which arcs begin or end.
 
-    Angles closer than a quarter of an arc have one error in common, because a sweep back passes the same encoder marks.
+    Angles of a joint that differ by less than a quarter of an arc count as the same angle, with one error, because a
+    sweep back passes the same encoder marks.
     """
     marks: list[tuple[int, float]] = []
     patterns_by_mark: list[Array] = []
@@ -250,10 +256,10 @@ def _encoder_patterns(segments: Segments, encoder_rad: float) -> Array:
 
 
 def _sweeps_between_moves(segments: Segments, joint: int) -> list[list[int]]:
-    """Return lists of the sweeps and transfers between moves of a joint; a transfer that moves the joint begins a list.
+    """Return lists of consecutive sweeps and transfers, by index; a new list begins whenever a joint has moved.
 
-    `joint` is counted from the end of the chain, −1 being the last joint. If a transfer is missing, a changed angle or
-    another recording shows that the joint moved.
+    `joint` is counted from the end of the chain, −1 being the last joint. A sweep or transfer that moves the joint
+    begins a list. Because transfers may be missing, a changed angle or another recording also begins one.
     """
     sweeps, firsts = np.unique(segments.sweep, return_index=True)
     between_moves: list[list[int]] = []
@@ -291,13 +297,16 @@ def rate_errors(intervals: Sequence[MotionInterval], steps: int) -> Array:
 
 
 def _wave_indices(motion: ArmMotion) -> dict[int, int]:
-    """Return the first index in `ANGLE_ERRORS` of the angle's harmonics for each of the last three joints (wrists)."""
+    """Return for each of the last three joints (wrists) the index in `ANGLE_ERRORS` of its first angle harmonic."""
     beyond = motion.kinematics.joints - 1 - WRIST_3
     return {joint + beyond: first for joint, first in FIRST_WAVE_INDEX.items() if joint + beyond >= 0}
 
 
 def _end_patterns(interval: MotionInterval) -> list[Array]:
-    """Return the errors (3,) of a transfer's rate, rad/s per rad, due to angle errors of its joints at its two ends."""
+    """Return the errors (3,) of a transfer's mean rate, rad/s per rad, due to an angle error of a joint at one end.
+
+    There is one for each end and each joint that moved.
+    """
     q_rad = interval.motion.angles(np.array([interval.start_s, interval.end_s]))
     axes = interval.motion.axes(q_rad) / (interval.end_s - interval.start_s)
     moved = [joint for joint in _wave_indices(interval.motion) if np.ptp(q_rad[:, joint]) >= STILL_RAD]
@@ -305,7 +314,7 @@ def _end_patterns(interval: MotionInterval) -> list[Array]:
 
 
 def _stamp_patterns(segments: Segments, stamp_s: float) -> Array:
-    """Return patterns of errors in the time stamps of each transfer's first and last sample; sweeps are unaffected."""
+    """Return a pattern for each transfer, due to errors of the time stamps of its first and last sample."""
     transfers = np.flatnonzero((segments.sweep < REST) & (stamp_s > 0))
     by_transfer = np.zeros((len(transfers), *segments.means_rad_s.shape))
     lasting_s = np.diff(segments.times_s[transfers])
@@ -316,13 +325,13 @@ def _stamp_patterns(segments: Segments, stamp_s: float) -> Array:
 
 
 def _speed_patterns(segments: Segments) -> list[Array]:
-    """Return a pattern for each sweep: the rate error per standard deviation of the sweep's speed."""
+    """Return a pattern for each sweep: the change of its rates by one standard deviation of its speed."""
     errors = segments.speed_std[:, None] * segments.rates_rad_s
     return [np.where((segments.sweep == sweep)[:, None], errors, 0.0)[None] for sweep in distinct(segments.sweep)]
 
 
 def _mount_patterns(segments: Segments, mount_rad: float) -> list[Array]:
-    """Return the patterns of errors of the item's mount in every stage except the first."""
+    """Return for every stage except the first the three patterns (3, N, 3) of errors of the item's mount."""
     mounts = [interval.motion.mount.tobytes() for interval in segments.intervals]
     errors = mount_rad * np.cross(np.eye(3)[:, None, :], segments.rates_rad_s)
     _, *others = dict.fromkeys(mounts)
@@ -332,7 +341,8 @@ def _mount_patterns(segments: Segments, mount_rad: float) -> list[Array]:
 def _nonlinearity_patterns(intervals: Sequence[MotionInterval], matrix: Array, curve: NonlinearityPrior) -> Array:
     """Return the effects (6, N, 3) of nonlinearity on the means of N intervals.
 
-    Each effect is that of one prior standard deviation: of the odd parts of x, y, z, then of their even parts.
+    They are the effects of the odd parts of axes x, y, z, then of their even parts, each with the size of one prior
+    standard deviation.
     """
     ends_s = np.array([(interval.start_s, interval.end_s) for interval in intervals])
     edges_s = np.linspace(ends_s[:, 0], ends_s[:, 1], TRANSFER_STEPS + 1, axis=1)
@@ -348,7 +358,7 @@ def _nonlinearity_patterns(intervals: Sequence[MotionInterval], matrix: Array, c
 
 
 def _temperature_patterns(segments: Segments, matrix: Array, known_errors: KnownErrors) -> list[Array]:
-    """Return the rate error of every segment per standard deviation of each temperature coefficient."""
+    """Return the patterns (k, N, 3) of the temperature coefficients of bias and scale; empty if these are unknown."""
     if known_errors.sensor is None:
         return []
     inside, order = segments.times_s.mean(axis=1), np.argsort(known_errors.temperature_times_s)
@@ -363,6 +373,6 @@ def _temperature_patterns(segments: Segments, matrix: Array, known_errors: Known
 
 
 def _rounding_patterns(segments: Segments) -> list[Array]:
-    """Return patterns of rounding errors that segments share, one standard deviation each."""
+    """Return the patterns of rounding errors that several segments share."""
     rounded = rounding_errors(segments.means_rad_s, segments.roundings_rad_s, segments.variances_rad2_s2)
     return [error.patterns / np.sqrt(3) for error in rounded]

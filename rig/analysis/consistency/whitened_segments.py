@@ -22,11 +22,11 @@ from rig.estimation.statistics.bias_process import BiasProcess
 
 @dataclass(frozen=True, slots=True)
 class Scatter:
-    """The errors of means, apart from bias drift.
+    """The errors of N means.
 
-    - variances_rad2_s2 (N, 3): the variances of independent errors.
-    - shared_rad_s (P, N, 3): independent patterns of shared errors.
-    - instability_rad_s: the least Allan deviation of the bias, 0 if unknown.
+    - variances_rad2_s2 (N, 3): the variances of errors that are independent in every mean.
+    - shared_rad_s (P, N, 3): the effects of P independent errors that means share, one standard deviation each.
+    - instability_rad_s: the least Allan deviation of the bias, from which drift is computed; 0 if unknown.
     """
 
     variances_rad2_s2: Array
@@ -80,9 +80,10 @@ class WhitenedSegments:
         return float(np.max(projections**2)), critical_value(false_alarm_probability / columns.shape[1])(1)
 
     def minimal_detectable_size(self, patterns: Array, alternatives: Iterable[Alternative]) -> float:
-        """Return the minimal detectable size of a fault with `patterns` (k, N, 3) per unit, tested by `alternatives`.
+        """Return the smallest size of a fault that a test of one of the `alternatives` detects.
 
-        An alternative is a pair of columns (3, N, c) and the critical value of their test.
+        `patterns` (k, N, 3) are the changes of the means by one unit of the fault. An alternative is a pair of columns
+        (3, N, c) and the critical value of their test.
         """
         whitened = ((apply_whitener(self.whitener, columns), limit) for columns, limit in alternatives)
         return minimal_detectable_size(
@@ -92,12 +93,15 @@ class WhitenedSegments:
         )
 
     def single_column_alternatives(self, columns: Array, false_alarm_probability: float) -> Iterator[Alternative]:
-        """Yield the alternatives of `test_single_columns`, columns (3, N, 1) each."""
+        """Yield the alternatives that `test_single_columns` tests: every single column (3, N, 1), and its limit."""
         limit = critical_value(false_alarm_probability / max(self._independent_columns(columns).shape[1], 1))
         yield from ((column[..., None], limit) for column in np.moveaxis(columns, -1, 0))
 
     def _independent_columns(self, columns: Array) -> Array:
-        """Return unit columns (3 N, k), orthogonal to the model, without columns that lie in the model."""
+        """Return the parts of whitened columns that are orthogonal to the model, as unit columns (3 N, k).
+
+        Columns that lie in the model are dropped.
+        """
         new = apply_whitener(self.whitener, columns)
         sizes = np.linalg.norm(new, axis=0)
         new = new - self.basis @ (self.basis.T @ new)
@@ -121,14 +125,14 @@ def critical_value(false_alarm_probability: float) -> Callable[[int], float]:
 
 
 def whiten_segments(segments: Segments, scatter: Scatter, bias: BiasProcess) -> WhitenedSegments:
-    """Return the means of segments and their model, whitened."""
+    """Return the means of segments and the columns of their model, whitened by the scatter and the bias drift."""
     whitener = build_whitener(segments, scatter, bias)
     readings = apply_whitener(whitener, segments.means_rad_s.T[:, :, None])[:, 0]
     return WhitenedSegments(whitener, readings, apply_whitener(whitener, repeat_per_axis(_model_columns(segments))))
 
 
 def _model_columns(segments: Segments) -> Array:
-    """Return the columns (N, 8) of the model, common to all axes."""
+    """Return the columns (N, 8) of the model, which are the same for each axis: rates, bias, gravity, steady drift."""
     ones = np.ones(len(segments.sweep))
     return np.column_stack([segments.rates_rad_s, ones, segments.gravity_m_s2, normalise_time(segments)])
 
@@ -137,13 +141,12 @@ def build_whitener(segments: Segments, scatter: Scatter, bias: BiasProcess) -> A
     """Return the whitener W (3 N, 3 N), which makes the means' errors independent with variance 1.
 
     Noise and bias drift of each axis are whitened first, then the shared errors. Shared errors may be 10⁵ times the
-    noise (a free nonlinearity), so one decomposition of both would lose the noise to rounding. In the first part, no
-    variance is allowed below the smallest noise, because after a clock was set back windows overlap, and the drift's
-    matrix is no covariance.
+    noise (a free nonlinearity), so one decomposition of both would lose the noise to rounding.
     """
     count, bias_covariance = len(segments.sweep), bias.covariance(segments.times_s)
     noise_whitener, least = np.zeros((3, count, 3, count)), segments.variances_rad2_s2.min()
     for axis, noise in enumerate(scatter.variances_rad2_s2.T):
+        # If a clock was set back, windows overlap, and the drift's matrix is no covariance: its variances are limited.
         variances, directions = np.linalg.eigh(np.diag(noise) + bias_covariance)
         noise_whitener[axis, :, axis] = directions.T / np.sqrt(np.maximum(variances, least))[:, None]
     whitener = noise_whitener.reshape(3 * count, 3 * count)
