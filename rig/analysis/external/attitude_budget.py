@@ -32,7 +32,7 @@ CONTRIBUTOR_SOURCES: Mapping[str, tuple[Literal["A", "B"], str]] = {
 
 
 def noise_dof(solution: TriaxialSolution, equations: Equations) -> float:
-    """Return the smallest of the six degrees of freedom of scale and bias for noise alone."""
+    """Return the smallest degrees of freedom, due to noise alone, of the three scale factors and three biases."""
     response = response_in_attitudes(solution, equations.measurements)
     rows = scale_and_bias(solution.matrix, scale_of(solution.matrix), len(response)) @ response
     return fewest_dof(rows, equations.variances.ravel(), equations.dof.ravel())
@@ -41,10 +41,9 @@ def noise_dof(solution: TriaxialSolution, equations: Equations) -> float:
 def budget_by_causes(matrix: Array, causes: Mapping[str, Array], noise_dof: float | None = None) -> Budget:
     """Return the budget of scale and bias, with a contributor for each of `causes`.
 
-    The causes are parts (p, p) of the covariance of a reference model's p parameters; the first nine of these are the
-    `matrix` F (3, 3), row by row. All degrees of freedom are infinite, except those of the noise if `noise_dof` is
-    given. A solution that integrates over the likelihood of its variance components, or inflates by Student's t, needs
-    no finite ones, because its standard uncertainty includes the uncertainty of the components (JCGM 101, 6.4.9).
+    Each cause is a part (p, p) of the covariance of p parameters, the first nine of which are the `matrix` F (3, 3),
+    row by row. All degrees of freedom are infinite, except those of the noise if `noise_dof` is given. They may be
+    infinite if the standard uncertainty already includes the uncertainty of the variances (JCGM 101, 6.4.9).
     """
     scale = scale_of(matrix)
     lines = []

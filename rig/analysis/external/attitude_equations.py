@@ -20,11 +20,12 @@ from rig.observation.external.placements import Placements
 
 @dataclass(frozen=True, slots=True)
 class Equations:
-    """The readings of a sensor and the attitudes in which they were taken.
+    """The mean readings of a sensor, and the attitudes in which they were taken.
 
-    - `means`, `variances` (N, 3), with `dof` (N, 3) degrees of freedom of the variances.
+    - `means`, `variances` (N, 3): the means and their variances; `dof` (N, 3): degrees of freedom of the variances.
     - `attitudes` (N, 3, 3); `std_rad` (N,): their stated standard deviations, None if not stated.
     - `reference`: the norm of a constant reference, or, for a gyroscope, the rates (N, 3) of the table.
+    - `second_order`: whether quadratic terms are estimated.
     """
 
     means: Array
@@ -37,7 +38,10 @@ class Equations:
 
     @staticmethod
     def from_rows(placed: PlacedReadings, *, exact_rates: bool) -> "Equations":
-        """Return a gyroscope's equations, with the rates of its reference. Raise Fault `no_rates`."""
+        """Return a gyroscope's equations, with the rates that its reference states.
+
+        Raise Fault `no_rates` unless rates are stated and are exact; `too_few_observations` if their noise is unknown.
+        """
         rows = placed.rows
         if isinstance(rows, Fault):
             raise rows
@@ -59,7 +63,7 @@ class Equations:
     def from_placements(
         placements: Placements, quantity: Quantity, reference: KnownNorm, *, second_order: bool
     ) -> "Equations":
-        """Return the equations of a sensor that measures a constant reference."""
+        """Return the equations of a sensor that measures a constant reference, such as gravity, at rest."""
         return Equations(
             placements.read.means[quantity],
             placements.read.variances[quantity],
@@ -72,7 +76,7 @@ class Equations:
 
     @property
     def measurements(self) -> Dwells:
-        """The means by attitude."""
+        """The means with their variances and attitudes."""
         return Dwells(self.means, self.variances, self.attitudes)
 
     @property
@@ -98,15 +102,15 @@ class Equations:
         )
 
     def solve_others(self, method: Method, *others: Method) -> Attempts[Method, TriaxialSolution]:
-        """Return the solutions by the `others` except `method`, or the Fault of a method that has none."""
+        """Return the solution by each of the `others`, without `method`, or the Fault if there is no solution."""
         return attempt_each({other: partial(self.solve, other) for other in others if other != method})
 
 
 def _estimate_variances(rows: Rows, reference: KnownVector) -> tuple[Array, Array]:
-    """Return the variances (N, 3) of the means and their dof, from one variance for all samples.
+    """Return the variances (N, 3) of the means, and the degrees of freedom (N, 3) of these variances.
 
-    The residuals of a fit with equal weights determine that variance, because a model with attitude errors would
-    mistake noise for such errors. Raise Fault `too_few_observations` without redundant rows.
+    All samples of an axis have one variance, which follows from the residuals of a fit without attitude errors. Raise
+    Fault `too_few_observations` if there are no more rows than parameters require.
     """
     counts = rows.samples[:, None]
     quiet = np.full_like(rows.means, (1e-9 * np.abs(rows.means).max()) ** 2) / counts

@@ -48,9 +48,10 @@ class AttitudeCalibration:
 
     - `triad`: scale and axes; `budget`: the contributors to the uncertainty.
     - `other_methods`: the solutions by the other methods, or the Fault of a method that fails.
-    - `measurements`: the means in attitudes; `dwells`: the placements.
+    - `measurements`: the mean readings with their attitudes; `dwells`: the same with their times.
     - `reference_fault`: the Fault that says why a gyroscope's estimated reference is not the Earth's rate, or None.
-    - `laid`: the estimated placement errors; `unplaced_rests`: how many rests without an attitude contribute to them.
+    - `laid`: the solution with placement errors, None by methods without them.
+    - `unplaced_rests`: the number of rests without an attitude that contribute to `laid`.
     - `moving`: the number of rows left out because the body moved.
     """
 
@@ -72,10 +73,10 @@ Result = AttitudeCalibration | IncrementCalibration
 def solve_placed(
     name: str, placed: PlacedReadings, site: Site, options: SolveOptions, method: Chosen | None, *, second_order: bool
 ) -> Attempts[Quantity, Result | OfKind]:
-    """Return the calibration of every recorded quantity of a sensor, or its Fault, by `method`.
+    """Return the calibration of every recorded quantity of a sensor by `method`, or its Fault.
 
-    If `method` is None, it is "attitude_weighted"; for a gyroscope it is "increments" (over windows of `window_s`), or
-    "maximum_likelihood" if the options state `exact_rates`.
+    If `method` is None, gyroscopes are solved by "increments", or by "maximum_likelihood" if the options state that
+    rates are exact (`exact_rates`); other sensors are solved by "attitude_weighted", which also replaces "increments".
     """
     any_mounting, exact_rates = options.any_mounting, options.exact_rates
 
@@ -127,7 +128,7 @@ def _check_noisy(placements: Placements, quantity: Quantity) -> None:
 
 
 def find_method(name: str | None) -> Chosen | None:
-    """Return the method called `name`, None without a name. Raise Refused `unknown_estimator`."""
+    """Return the method called `name`, or None if `name` is None. Raise Refused `unknown_estimator`."""
     return None if name is None else choose_estimator(CHOICES, name)
 
 
@@ -151,10 +152,11 @@ def _solve_rows(equations: Equations, method: Method, *, any_mounting: bool) -> 
 def _solve_placements(
     placements: Placements, quantity: Quantity, equations: Equations, method: Method, *, any_mounting: bool
 ) -> AttitudeCalibration:
-    """Return the calibration from placements, with placement errors if the method models attitude errors.
+    """Return a sensor's calibration from placements; "attitude_weighted" also estimates placement errors.
 
-    Raise Fault `bias_jumped` or `scale_changed` if the sensor changed abruptly by more than U covers, and what
-    `Equations.solve` raises.
+    Raise Fault `bias_jumped` or `scale_changed` if the sensor changed abruptly by more than U covers, and the Faults of
+    `Equations.solve`, `check_identifiable` and `check_mounted`; `too_few_observations` if a scale factor depends on a
+    single placement.
     """
     unplaced, moving = placements.unplaced, placements.left_out
     solution, laid = _solve(equations, method, placements), None
@@ -210,7 +212,7 @@ def _dwells(placements: Placements, quantity: Quantity) -> Iterator[StaticReadin
 
 
 def _solve(equations: Equations, method: Method, placements: Placements) -> TriaxialSolution:
-    """Return the solution. For too few rests, the Fault mentions the rows that were left out."""
+    """Return the solution of the equations. If rests are too few, the Fault also mentions the rows left out."""
     try:
         return equations.solve(method)
     except Fault as fault:

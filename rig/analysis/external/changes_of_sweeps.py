@@ -19,7 +19,7 @@ MIN_STEP_RATIO = 0.01  # to the sweeps' rate: without rests, a smaller step may 
 
 
 def check_sweeps_steady(data: ExternalData) -> None:
-    """Raise Fault `bias_jumped` or `scale_changed` if the gyroscope certainly changed between two of the rows."""
+    """Raise Fault `bias_jumped` or `scale_changed` if the gyroscope certainly changed between two rows of the file."""
     change = data.change
     if change is None or data.at_reference:  # then polynomials contain the change
         return
@@ -30,9 +30,10 @@ def check_sweeps_steady(data: ExternalData) -> None:
 
 
 def estimate_changes(data: ExternalData, matrix: Array) -> Array:
-    """Return the covariance (12, 12) of the elements of `matrix`, row by row, and bias, due to changes of the sensor.
+    """Return the covariance (12, 12) of matrix and bias due to changes of the sensor that the rows show.
 
-    The rows may show an abrupt change, and changes of the bias from rest to rest; if not, the covariance is zero.
+    It is for the elements of `matrix` (3, 3), row by row, then the bias. The changes are an abrupt one, and those of
+    the bias from rest to rest; if the rows show neither, the covariance is zero.
     """
     change = data.change
     abrupt = change.find_covariance(matrix) if change is not None and _must_include(change) else np.zeros((12, 12))
@@ -41,7 +42,7 @@ def estimate_changes(data: ExternalData, matrix: Array) -> Array:
 
 
 def widen_by_changes(solution: TurnedSolution, data: ExternalData) -> TurnedSolution:
-    """Return a solution by turns whose covariances and budget include the gyroscope's changes over the rows."""
+    """Return the solution with the gyroscope's changes over the rows added to its covariances and budget."""
     changes = estimate_changes(data, solution.matrix)
     to_parameters = parameter_jacobian(solution.matrix, solution.scale)
     more = to_parameters @ changes @ to_parameters.T
@@ -57,17 +58,17 @@ def widen_by_changes(solution: TurnedSolution, data: ExternalData) -> TurnedSolu
 
 
 def _must_include(change: AbruptChange) -> bool:
-    """Return whether U must include a change: a likely one, or a possible large change of the bias."""
+    """Return whether U must include a change: if it is likely, or if it is a large change of the bias."""
     is_large = change.what == "bias" and float(np.abs(change.sizes).max()) > RATE.steady
     return is_large or change.evidence >= MIN_EVIDENCE
 
 
 def _is_certain(data: ExternalData, change: AbruptChange) -> bool:
-    """Return whether a step of the bias is certain, not an error of the stated motion.
+    """Return whether a step of the bias is certain, and cannot be an error of the stated motion.
 
-    If there are rests before and after the step, they must show at least half of it; otherwise the step must exceed the
-    effect of plausible errors of all stated rates. A step after the first row or before the last one is never certain,
-    because that single row may be wrong.
+    If there are rests before and after the step, they must show more than half of it; otherwise the step must exceed
+    the effect of plausible errors of all stated rates. A step with too few rows on either side is never certain,
+    because these rows may be wrong.
     """
     axis = int(np.argmax(np.abs(change.sizes)))
     size_rad_s = float(change.sizes[axis])
@@ -86,9 +87,10 @@ def _is_certain(data: ExternalData, change: AbruptChange) -> bool:
 
 
 def _find_leverage(rates_rad_s: Array, readings_rad_s: Array, is_later: Array) -> float:
-    """Return the std, rad/s, of the bias step of one axis if all stated rates have a relative error of 1.
+    """Return the std, rad/s, of an axis' apparent bias step, per unit of relative error of the stated rates.
 
-    The N rows have `rates_rad_s` (N, 3) and `readings_rad_s` (N,) of the axis; `is_later` (N,) is true after the step.
+    The rates `rates_rad_s` (N, 3) of N rows err independently; `readings_rad_s` (N,) are those of the axis, and
+    `is_later` (N,) is true for rows after the step.
     """
     design = np.column_stack([rates_rad_s, np.ones(len(rates_rad_s))])
     inverse = np.linalg.pinv(design)

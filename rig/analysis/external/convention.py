@@ -29,13 +29,15 @@ MIN_VERTICAL_GRAVITY = 0.97  # component along the vertical axis of the room
 
 @dataclass(frozen=True, slots=True)
 class Convention:
-    """A convention of quaternions, with the fraction `explained` of the attitudes' rates that the gyroscope confirms.
+    """A convention of quaternions, and how well the readings agree with it.
 
+    - explained: the fraction of the variance of the attitudes' rates that the gyroscope's readings explain.
     - scalar_last: the columns read as qw qx qy qz contain qx qy qz qw.
     - inverse: the quaternions take room to body coordinates; None if the motion does not show it.
     - lag_s: the time by which the readings are later than the attitudes.
     - ratio: the rate that the attitudes show, divided by the gyroscope's reading.
-    - gravity: length of the mean specific force in the room, relative to the mean length; 0 without an accelerometer.
+    - gravity: length of the mean vector of specific force in the room, divided by the mean length of the vectors; near
+      1 if the force has one direction; 0 without an accelerometer.
     - up: the room's axis that points upwards, as for `--up`; "" if no accelerometer shows it.
     """
 
@@ -49,9 +51,10 @@ class Convention:
 
 
 def find_convention(samples: Samples, attitudes: Columns, *, is_order_named: bool) -> Convention | None:
-    """Return the convention of attitudes (N,) on the samples' clock; None if the motion does not show it.
+    """Return the convention of a reference's `attitudes`, whose times are on the samples' clock.
 
-    `is_order_named`: the file states which number is the scalar part.
+    `is_order_named`: the file states which number is the scalar part. Return None if the motion does not show the
+    convention, or if there is no gyroscope.
     """
     if RATE not in samples.readings:
         return None
@@ -75,7 +78,7 @@ def find_convention(samples: Samples, attitudes: Columns, *, is_order_named: boo
 
 
 def _choose_direction(best: Convention, other: Convention) -> Convention:
-    """Return the better of two fits, whose direction is None if the readings do not show it.
+    """Return the better of two fits for opposite directions; its `inverse` is None if readings do not show which.
 
     Turns about one axis at a time fit both directions. Then only the right direction of the quaternions keeps gravity
     constant in the room.
@@ -89,7 +92,10 @@ def _choose_direction(best: Convention, other: Convention) -> Convention:
 
 
 def _fit(samples: Samples, time_s: Array, quaternions: Array, *, scalar_last: bool, inverse: bool) -> Convention:
-    """Return the convention with the lag at which rates of `quaternions` (N, 4) at times (N,) fit the readings best."""
+    """Return a given convention with the lag at which it fits the readings best, and how well it fits.
+
+    `quaternions` (N, 4) are the reference's, at the times `time_s` (N,).
+    """
     from scipy.spatial.transform import Rotation
 
     rotations = Rotation.from_quat(quaternions if scalar_last else np.roll(quaternions, -1, axis=1))
@@ -124,7 +130,10 @@ def _mean_rates(time_s: Array, total: Array, edges_s: Array, close: NDArray[np.b
 
 
 def _explain(rates: Array, readings: Array) -> tuple[float, Array]:
-    """Return the fraction of the variance of rates (n, 3) explained by a linear map of readings (n, 3), and the map."""
+    """Return the fraction of the variance of `rates` (n, 3) that a linear map of `readings` (n, 3) explains.
+
+    Also return the matrix (3, 3) of this map.
+    """
     design = np.column_stack([readings, np.ones(len(readings))])
     fit = np.linalg.lstsq(design, rates, rcond=None)[0]
     residuals = rates - design @ fit
@@ -134,9 +143,10 @@ def _explain(rates: Array, readings: Array) -> tuple[float, Array]:
 
 
 def _find_up(forces: Array) -> tuple[float, str]:
-    """Return the length of the mean force divided by the mean length of forces (n, 3), and the room's axis along it.
+    """Return the length of the mean vector of `forces` (n, 3), divided by the mean length of all vectors.
 
-    The axis has a sign, as in "+z"; it is "" if the mean force is too short or too oblique to show one.
+    Also return the room's axis along the mean vector, with its sign, as in "+z"; "" if the mean vector is too short or
+    too oblique to show one.
     """
     mean = forces.mean(axis=0)
     mean /= max(float(np.linalg.norm(forces, axis=1).mean()), 1e-9)

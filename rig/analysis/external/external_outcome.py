@@ -11,9 +11,9 @@ from rig.data.recording.run_data import RunData
 
 
 def calibrate_external(runs: Sequence[RunData], external: ExternalReadings, estimator: str) -> Outcome:
-    """Return the outcome of readings whose motion a file describes; by default the configured estimator solves them.
+    """Return the outcome of readings whose motion a file describes.
 
-    Raise as `solve_external` does.
+    The default `estimator` stands for the configured one. Raise as `solve_external` does.
     """
     settings, name = runs[0].settings, external.item.name
     configured = None if settings.elsewhere is None else settings.elsewhere.estimator

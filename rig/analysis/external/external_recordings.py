@@ -75,12 +75,12 @@ class ExternalResult:
     - gyroscope: its calibration, None without one.
     - rates: the gyroscope's solution in attitudes, None if it was solved from sweeps.
     - at_rest: the solutions of the other quantities, from rests.
-    - unsolved: the faults of recorded quantities without a solution.
+    - unsolved: for each recorded quantity without a solution, the Fault that says why.
     - turned: the turns from rest to rest that the solution uses, if any.
-    - installed_kinds: the solutions of kinds of sensors that packages add.
+    - installed_kinds: the solutions of sensors of kinds that installed packages add.
     - polynomials: the calibration over temperature, if any.
-    - omitted: what was left out, by quantity, None for all quantities.
-    - notes: what the user should know about reading and solving.
+    - omitted: the readings and rows left out, each with the quantity concerned, None for all quantities.
+    - notes: sentences for the user about the reading of the files and the solution.
     """
 
     item: Item
@@ -96,10 +96,10 @@ class ExternalResult:
 
 
 def solve_external(read: ExternalReadings, settings: RunSettings, estimator: str | None) -> ExternalResult:
-    """Return the solution of readings whose motion a file describes; `estimator` None chooses one.
+    """Return the solution of readings whose motion a file describes; if `estimator` is None, one is chosen.
 
     Raise Refused `unknown_estimator`, and what `average_sweeps` and `average_placements` raise. If no quantity has a
-    solution, raise the estimator's Fault, or `nothing_solved` with every reason if there are several.
+    solution, raise the estimator's Fault; for several quantities, Refused `nothing_solved` with every reason.
     """
     samples = samples_in(read.readings, "the recording")
     with _mention(samples.omitted):
@@ -130,10 +130,11 @@ def _add_notes(sensor: ExternalResult, read: ExternalReadings, samples: Samples)
 
 
 def check_external(name: str, sensor: ExternalResult) -> Iterator[Check]:
-    """Yield checks in addition to the solvers' own: the condition of the equations, u of scale, the error of attitudes.
+    """Yield the verdict's checks of an external recording.
 
-    Every quantity without a solution has a failing check. There are no further checks, because files come without a
-    configuration that states limits.
+    They are of the condition of the equations, of the standard uncertainty of the scale factors, and of the error of
+    the attitudes. Every quantity without a solution has a failing check. There are no further checks, because files
+    come without a configuration that states limits.
     """
     yield from list_unsolved((name, quantity.name, fault) for quantity, fault in sensor.unsolved.items())
     if (gyroscope := sensor.gyroscope) is not None:
@@ -158,7 +159,7 @@ def _solve_turns(read: ExternalReadings, samples: Samples, name: str | None) -> 
 def _solve_sweeps(
     read: ExternalReadings, samples: Samples, name: str | None, reference_c: float | None
 ) -> ExternalResult:
-    """Return the solution of a file's sweeps and rests by the estimator `name`; None chooses one.
+    """Return the solution of a file's sweeps and rests by the estimator `name`; if it is None, one is chosen.
 
     The readings are first corrected to the temperature `reference_c`, if given.
     """
@@ -209,7 +210,7 @@ def _solve_sweeps(
 
 @contextmanager
 def _mention(omitted: Sequence[Omitted]) -> Iterator[None]:
-    """Add what was `omitted` before the block to the message of any Fault or Refused that the block raises."""
+    """Add a list of the readings `omitted` so far to the message of any Fault or Refused that the block raises."""
     try:
         yield
     except (Fault, Refused) as error:
@@ -220,9 +221,10 @@ def _mention(omitted: Sequence[Omitted]) -> Iterator[None]:
 
 
 def solve_swept(data: ExternalData, estimator: BySweeps | None) -> Estimate:
-    """Return the solution by `estimator`; None stands for "increments" if turns start and end at rest, else "vector".
+    """Return the solution of sweeps by `estimator`.
 
-    Raise Fault `no_turns`, `bias_jumped`, `scale_changed`, and as the estimators do.
+    If `estimator` is None, it is "increments" if turns start and end at rest, else "vector". Raise Fault `no_turns` if
+    "increments" has no such turns; `bias_jumped`, `scale_changed`, Refused `bad_sweep`, and what the estimators raise.
     """
     if estimator is None:
         estimator = "vector" if data.turned is None else "increments"
@@ -246,7 +248,10 @@ def solve_swept(data: ExternalData, estimator: BySweeps | None) -> Estimate:
 
 
 def budget_of(solution: Estimate, data: ExternalData) -> Budget:
-    """Return the budget of a `solution`, whose contributors are the means' scatter and errors of the stated motion."""
+    """Return the budget of a `solution` of sweeps.
+
+    The contributors are the scatter of the means and the errors of the stated motion; a solution by turns has its own.
+    """
     if data.turned is None or not isinstance(solution, TurnedSolution):
         vector = solution if isinstance(solution, VectorSolution) else _vector(data)
         errors, covariance = sweep_errors(vector, data), solution.covariance
@@ -280,7 +285,10 @@ def _vector(data: ExternalData) -> VectorSolution:
 def _solve_attitudes(
     read: ExternalReadings, samples: Samples, settings: RunSettings, name: str | None
 ) -> ExternalResult:
-    """Return the solution of all quantities in known attitudes by the method `name`; None chooses one for each."""
+    """Return the solution of all quantities in known attitudes by the method `name`.
+
+    If `name` is None, a method is chosen for each quantity.
+    """
     method, site, options = find_method(name), settings.site, settings.elsewhere
     assert options is not None, "of readings of others"
     placed = average_placements(samples, read.motion, find_clock=options.find_clock)
@@ -361,7 +369,7 @@ def _describe_as_swept(result: Result) -> TurnedSolution:
 
 
 def _nothing_solved(unsolved: Mapping[Quantity, Fault]) -> Fault | Refused:
-    """Return one error with all reasons and remedies; a single error is returned unchanged."""
+    """Return one error that contains the messages of all Faults in `unsolved`; a single Fault is returned unchanged."""
     faults: Sequence[Fault] = list(unsolved.values())
     if len(faults) == 1:
         return faults[0]

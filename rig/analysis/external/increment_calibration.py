@@ -29,9 +29,11 @@ MAX_ITERATIONS = 3  # the clock of one determines the increments of the next
 
 @dataclass(frozen=True, slots=True)
 class IncrementCalibration:
-    """The solution, the duration over which each attitude is averaged, and the increments left out.
+    """The solution from increments of angle between attitudes.
 
-    `increments`: the number of all increments, including those left out.
+    - `window_s`: the duration over which each attitude is averaged.
+    - `left_out`: the increments that could not be formed, by reason.
+    - `increments`: the number of all increments, including those left out.
     """
 
     solution: IncrementSolution
@@ -74,7 +76,7 @@ def _spell_time(time_s: float) -> str:
 
 
 def solve_turning(turning: Turning, window_s: float | None, *, any_mounting: bool) -> IncrementCalibration:
-    """Return the gyroscope's matrix and bias, with windows of a given or an automatically chosen length.
+    """Return the gyroscope's calibration from attitudes averaged over windows of `window_s`; if None, it is chosen.
 
     Raise Fault `inverted_attitudes`, and what `gather`, `solve_known_increments`, `check_rate_ratios`, `check_offset`,
     `check_steady`, `check_rests_agree` and `check_axes` raise.
@@ -99,7 +101,7 @@ def solve_turning(turning: Turning, window_s: float | None, *, any_mounting: boo
 
 
 def _solve(turning: Turning, window_s: float | None) -> IncrementCalibration:
-    """Return the solution by iteration, because the estimated clock offset determines which readings are missing."""
+    """Return the solution, repeated until the estimated clock offset no longer changes which readings are missing."""
     start = find_start(select_covered(turning)).state
     check_unit(scale_of(start.matrix))
     gathered = gather(turning, window_s, start.clock_s)

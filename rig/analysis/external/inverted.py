@@ -28,11 +28,10 @@ Solved = TypeVar("Solved", bound=HasMatrix)
 
 
 def solve_unless_inverted(attitudes: Array, solve: Callable[[Array], Solved], contradicting: Collection[str]) -> Solved:
-    """Return the result of `solve` with attitudes (N, 3, 3).
+    """Return the result of `solve` with attitudes (N, 3, 3). Raise Fault as `solve` does.
 
-    Raise the Faults of `solve`. A Fault among `contradicting` is replaced by `inverted_attitudes` if the inverse
-    attitudes agree with the readings; the message then names the cause, which is an inversion, or the order of the
-    quaternions' numbers.
+    If the Fault's name is in `contradicting` and the attitudes in another convention have a solution, raise instead
+    Fault `inverted_attitudes`, whose message names the mistake: inverse quaternions, or the order of their numbers.
     """
     try:
         return solve(attitudes)
@@ -43,9 +42,10 @@ def solve_unless_inverted(attitudes: Array, solve: Callable[[Array], Solved], co
 
 
 def _find_convention(attitudes: Array, solve: Callable[[Array], Solved]) -> Fault | None:
-    """Return the error for reordered or for inverse quaternions if `solve` succeeds with the corrected ones, else None.
+    """Return the Fault that names the mistake in the attitudes, None if `solve` fails with either correction.
 
-    If it succeeds with both corrections, the one that brings the sensor's axes nearer to the body's is right.
+    The mistake is inverse quaternions, or another order of their numbers. If `solve` succeeds with both corrections,
+    the one that brings the sensor's axes nearer to the body's is right.
     """
     inverted = or_fault(lambda: solve(np.swapaxes(attitudes, -1, -2)))
     reordered = or_fault(lambda: solve(_read_scalar_last(attitudes)))
@@ -57,7 +57,7 @@ def _find_convention(attitudes: Array, solve: Callable[[Array], Solved]) -> Faul
 
 
 def _read_scalar_last(attitudes: Array) -> Array:
-    """Return the right attitudes (N, 3, 3) if those given were written as quaternions x y z w, but read as w x y z."""
+    """Return the attitudes (N, 3, 3) as if their quaternions, which were read as w x y z, had been written x y z w."""
     from scipy.spatial.transform import Rotation
 
     read = Rotation.from_matrix(attitudes).as_quat()[:, [3, 0, 1, 2]]

@@ -27,7 +27,7 @@ NOISE_LIMIT_RAD_S = 0.04  # standard deviation of single readings, 2.3 °/s: SIX
 def list_omitted(
     placed: PlacedReadings, results: Mapping[Quantity, Result | OfKind]
 ) -> Iterator[tuple[Quantity | None, Omitted]]:
-    """Yield the readings left out of a solution in attitudes, each with its quantity, None for all quantities."""
+    """Yield the readings left out of a solution in attitudes, each after the quantity concerned, None for all."""
     yield from ((None, omitted) for omitted in placed.omitted)
     rates = results.get(RATE)
     # A solution by increments omits increments; one by means in attitudes omits rows in which samples are missing.
@@ -42,7 +42,7 @@ def list_omitted(
 
 
 def notes_on_reading(read: ExternalReadings, samples: Samples) -> Iterator[str]:
-    """Yield notes on changes made to the files' times and rows."""
+    """Yield notes for the user on the origin of the files' times, and on rows that were changed or left out."""
     if read.note:
         yield read.note
     yield from samples.notes
@@ -53,7 +53,10 @@ def notes_on_reading(read: ExternalReadings, samples: Samples) -> Iterator[str]:
 
 
 def notes_on_speeds(data: ExternalData) -> Iterator[str]:
-    """Yield a note if speeds look like °/s, because a wrong unit that both files share shows in the bias alone."""
+    """Yield a note if speeds look like °/s.
+
+    If readings and speeds share a wrong unit, the scale factors are right, but the bias has this unit too.
+    """
     fastest = max((sweep.speed_rad_s for sweep in data.sweeps), default=0.0)
     remedy = "if both files are in °/s, state that unit with --columns, because the bias depends on it"
     if RATE.mistaken is not None and fastest > RATE.mistaken.unusual:
@@ -73,7 +76,10 @@ def notes_on_speeds(data: ExternalData) -> Iterator[str]:
 
 
 def notes_on_scale(scale: Array) -> Iterator[str]:
-    """Yield a note if all scale factors (3,) are far above 1, or all far below, as with half turns stated as whole."""
+    """Yield a note if all scale factors (3,) are far above 1, or all far below.
+
+    They are if half turns are stated as whole ones.
+    """
     if np.all(scale > UNUSUAL_SCALE_RATIO) or np.all(scale < 1 / UNUSUAL_SCALE_RATIO):
         yield (
             f"the scale factors are near {np.median(scale):.2g}, and those of readings in rad/s near 1: check the "
@@ -82,7 +88,7 @@ def notes_on_scale(scale: Array) -> Iterator[str]:
 
 
 def _are_whole(turned: Array, part: float) -> bool:
-    """Return whether all angles `turned` (k,), at least one, are whole multiples of `part`, 1 or more."""
+    """Return whether all angles `turned` (k,) are nonzero multiples of `part`; False if there are no angles."""
     multiples = np.rint(turned / part)
     return bool(len(turned) and (multiples > 0).all() and (np.abs(turned / part / multiples - 1) < MAX_ERROR).all())
 
@@ -98,7 +104,7 @@ def notes_on_changes(data: ExternalData) -> Iterator[str]:
 
 
 def notes_on_turns(data: ExternalData, solution: Estimate) -> Iterator[str]:
-    """Yield a note if rows with an angle were solved from their mean speed."""
+    """Yield a note if turns with a stated angle were solved from their mean speed, as they do not start at rest."""
     if not data.by_mean:
         return
     why = (

@@ -1,6 +1,7 @@
 """The ratio of a reference's rates to a gyroscope's readings, which shows readings in another unit or out of range.
 
-A repeated value does not show the end of the range if readings were corrected, because these contain other axes' noise.
+At the end of its range a sensor repeats one value. Corrected readings do not show this, because each contains the noise
+of other axes.
 """
 
 import numpy as np

@@ -27,9 +27,9 @@ MAX_HALF_RANGE_RAD_S = 2 * RATE.steady
 
 
 def include_rounding(solution: IncrementSolution, at_rest: MeansAtRest | None) -> IncrementSolution:
-    """Return the solution with the rounding of its bias, if the readings at rest have coarse steps.
+    """Return the solution with rounding added to the uncertainty of its bias, if readings at rest have coarse steps.
 
-    At rest a reading without much noise repeats the same wrong number, which no mean and no other rest shows.
+    At rest a reading without much noise repeats one rounded number, whose error no mean and no other rest reduces.
     """
     if at_rest is None or not (at_rest.rounding > MIN_ROUNDING * np.diag(solution.covariance)[BIAS]).any():
         return solution
@@ -40,10 +40,10 @@ def include_rounding(solution: IncrementSolution, at_rest: MeansAtRest | None) -
 
 
 def check_rests_agree(solution: IncrementSolution, at_rest: MeansAtRest | None) -> None:
-    """Raise Fault `bias_contradicts_rests` if the bias differs from the readings at rest, `bias_jumped` if these jump.
+    """Raise Fault `bias_contradicts_rests` if the bias differs too much from the mean of the readings at rest.
 
-    A rest is used only if both the readings and the rows' attitudes show it. Rests may differ by their scatter, by
-    motion that the reference does not show, and by the effect of gravity on a gyroscope.
+    They may differ by the scatter of the rests, by motion that the reference does not show, and by the effect of
+    gravity on a gyroscope. Raise Fault `bias_jumped` if the readings at rest themselves differ by more than a drift.
     """
     if at_rest is None:
         return
@@ -66,7 +66,7 @@ def check_rests_agree(solution: IncrementSolution, at_rest: MeansAtRest | None) 
 
 
 def _check_steady(half_range_rad_s: Array) -> None:
-    """Raise Fault `bias_jumped` if half the range (3,) of the mean readings at rest exceeds a plausible bias drift."""
+    """Raise Fault `bias_jumped` if half the range (3,) of the readings at rest exceeds a plausible bias drift."""
     axis = int(np.argmax(half_range_rad_s))
     if half_range_rad_s[axis] > MAX_HALF_RANGE_RAD_S:
         raise Fault(
@@ -86,9 +86,10 @@ def _critical_value(dof: float) -> float:
 
 
 def _motion_std_rad_s(turned_rad_s: Array) -> float:
-    """Return the standard deviation, about any axis, of the body's undetected motion averaged over all rests.
+    """Return the standard deviation of the mean rate, about any axis, by which the body moves undetected at rest.
 
-    The estimate is from the scatter of the reference's rates (k, 3), and inflated by Student's t for few rests.
+    It is estimated from the scatter of the reference's rates (k, 3) in k rests. For few rests it is inflated, so that a
+    normal critical value acts like Student's.
     """
     count = len(turned_rad_s)
     scatter = float(np.sqrt(np.var(turned_rad_s, axis=0, ddof=1).mean()))

@@ -24,10 +24,10 @@ MIN_DOF = 3  # with fewer, rounding down to the next integer would alone increas
 
 
 def check_agree(data: ExternalData) -> None:
-    """Check that every sweep agrees with the solution of all others (leave-one-out residuals).
+    """Raise Refused `bad_sweep` if a sweep contradicts the solution of all others, as one with a wrong angle does.
 
-    Raise Refused `bad_sweep` for the sweep that disagrees most, for example half a turn stated as a whole one, or a
-    wrong axis. If an axis has only two sweeps, both are named. Too few rows for a solution are not checked.
+    The message names the sweep that disagrees most; if its axis has only two sweeps, it names both. If there are too
+    few rows for a solution, they are not checked.
     """
     means, variances, design = _equations(data)
     redundancy = _redundancy_numbers(design)
@@ -61,10 +61,11 @@ def _name_contradiction(worst: int, data: ExternalData) -> str:
 
 @dataclass(frozen=True, slots=True)
 class SweepErrors:
-    """The covariances, with `dof`, that errors of the stated motion and changes of the sensor add to a solution.
+    """The covariances that errors of the stated motion and changes of the sensor add to those of a solution.
 
-    `covariance` (6, 6): of scale and bias; `matrix_covariance` (12, 12) and `angles_covariance_rad2` (6, 6): as in
-    `VectorSolution`, scaled so that twice a standard uncertainty is U.
+    - `covariance` (6, 6): of scale and bias, with `dof` degrees of freedom.
+    - `matrix_covariance` (12, 12), `angles_covariance_rad2` (6, 6): as in `VectorSolution`, enlarged so that U is twice
+      a standard uncertainty.
     """
 
     covariance: Array
@@ -94,10 +95,10 @@ def sweep_errors(solution: VectorSolution, data: ExternalData) -> SweepErrors | 
     rate_variance, axis_variance = sizes.median_variances
 
     def inflate(to_values: Array, dof: float, noise_dof: float) -> Array:
-        """Return the covariance (q, q), without noise, of values with the derivatives `to_values` (q, 12).
+        """Return the covariance (q, q) that motion errors add to values with the derivatives `to_values` (q, 12).
 
-        The covariance is that of motion errors of the median size. For each value it is scaled so that, together with
-        the noise, it gives the expanded uncertainty that follows from the posterior distribution of the errors' sizes.
+        It is that of errors of the median size, scaled for each value so that it gives, together with the noise, the
+        expanded uncertainty that follows from the posterior distribution of the errors' sizes.
         """
         by_noise, of_rate, of_axis, by_wrong = (
             to_values @ effects @ effects.T @ to_values.T for effects in (noise, by_rate, by_axis, wrong)
@@ -119,7 +120,7 @@ def sweep_errors(solution: VectorSolution, data: ExternalData) -> SweepErrors | 
 
 
 def count_redundant_rows(data: ExternalData) -> int:
-    """Return the number of rows beyond those that a solution needs.
+    """Return the number of rows in addition to the four that a solution needs.
 
     A row has three equations but counts once, because a wrong rate or a wrong end time affects all three.
     """
@@ -127,7 +128,7 @@ def count_redundant_rows(data: ExternalData) -> int:
 
 
 def noise_dof(solution: VectorSolution, data: ExternalData) -> float:
-    """Return the smallest of the six degrees of freedom of scale and bias for noise alone, in the vector model."""
+    """Return the smallest degrees of freedom, due to noise alone, of the scale factors and biases of a `solution`."""
     averages = [*(sweep.average for sweep in data.sweeps), *data.rests]
     variances = np.array([average.variance_rad2_s2 for average in averages])
     dof = dof_by_axis(average.dof for average in averages)
@@ -148,7 +149,7 @@ def add_errors(solution: VectorSolution, data: ExternalData) -> VectorSolution:
 
 
 def _derivatives(design: Array, means: Array, variances: Array) -> Array:
-    """Return the derivative (12, N, 3) of matrix, row by row, and offset with respect to each mean reading."""
+    """Return the derivatives (12, N, 3) of the matrix, row by row, and the offset with respect to `means` (N, 3)."""
     _, inverse = regress(design, means, variances)  # (3, 4, N)
     order, _ = index_coefficients(4)  # F row by row, then c
     gain = np.zeros((3, 4, len(means), 3))
@@ -158,10 +159,10 @@ def _derivatives(design: Array, means: Array, variances: Array) -> Array:
 
 
 def _contradictions(stated: StatedMotion, sizes: MotionErrors, design: Array) -> Array:
-    """Return the contradiction (N, 3) of each sweep with the others, beyond errors of the given sizes.
+    """Return the difference (N, 3) of each row from the solution of all others; 0 if these `sizes` explain it.
 
-    One wrong row among many hardly increases the sizes, so its contradiction counts in addition. With only two sweeps
-    about an axis, a wrong row has no contradiction, but increases the sizes.
+    One wrong row among many hardly increases the estimated sizes, so its difference counts in addition. With only two
+    sweeps about an axis, neither differs enough, but a wrong one increases the sizes.
     """
     rate_variance, axis_variance = sizes.median_variances
     spread = rate_variance * stated.rate_patterns**2 + axis_variance * np.sum(stated.axis_patterns**2, axis=0)
@@ -180,7 +181,7 @@ def _redundancy_numbers(design: Array) -> Array:
 def _additional_std(noise_std: Array, expanded: Array, known_dof: float, dof: float) -> Array:
     """Return the standard uncertainties (q,) that give, together with `noise_std` (q,), the U `expanded` (q,).
 
-    Degrees of freedom are `known_dof` for the noise, and `dof` for the result.
+    They have `dof` degrees of freedom, the noise has `known_dof`.
     """
 
     def is_too_small(std: Array) -> Array:
