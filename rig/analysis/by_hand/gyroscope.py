@@ -17,9 +17,9 @@ NO_SWEEPS = Fault("too_few_observations", "moves by hand are not sweeps", "Give 
 
 
 def solve_hand_samples(item: Item, samples: Samples, columns: Columns) -> SensorResult:
-    """Return the gyroscope's calibration from readings, under the stated conditions of the session (`read_conditions`).
+    """Return the gyroscope's calibration from the readings of a session; `columns` state its conditions.
 
-    Raise Fault and Refused as `rig.estimation.by_hand.solve_by_hand` does, and `stuck_sensor`.
+    Raise Fault and Refused as `rig.estimation.by_hand.solve_by_hand` does; Fault `stuck_sensor`.
     """
     check_reads(samples.readings[RATE], RATE)
     check_frozen(samples.time_s, samples.readings[RATE])
@@ -42,7 +42,7 @@ def build_hand_result(sensor: RecordedSensor | Item, solution: HandSolution, cor
 
 
 def read_conditions(columns: Columns) -> SessionConditions:
-    """Return the conditions of the session from its table of motion "turns", which has a single row."""
+    """Return the conditions of a session from `columns`, the single row of its table of motion "turns"."""
     first = columns.get("first_face")
     return SessionConditions(
         clock_ppm=float(columns["clock_ppm"][0]),

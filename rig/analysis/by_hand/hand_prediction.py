@@ -1,6 +1,7 @@
 """The prediction of the uncertainty of a session by hand, from simulated readings. Pure functions.
 
-The moves are those of the instructions, made evenly, with the stated standard deviations of a hand's errors.
+The simulated moves follow the instructions exactly and smoothly. The fit weights them by the stated standard deviations
+of a hand's errors.
 """
 
 from collections.abc import Sequence
@@ -37,9 +38,9 @@ def duration_s(moves: Sequence[Instruction], rest_s: float) -> float:
 def predict_hand_budgets(
     config: RigConfig, section: ByHandSection, moves: Sequence[Instruction], rest_s: float
 ) -> dict[str, Budget]:
-    """Return the predicted budget of a session with the given moves, for each sensor to calibrate.
+    """Return the predicted budget of each sensor to calibrate, for a session with the given moves.
 
-    `section` states the squareness of the item's faces. Raise Fault `no_fit`.
+    `section` states how square the item's faces are; `rest_s` is the duration of a rest. Raise Fault `no_fit`.
     """
     uncertainty, section_values = uncertainty_of(config), hand_settings(section)
     budgets = {}
@@ -84,7 +85,10 @@ def _session(sensor: SensorSection, moves: Sequence[Instruction], rest_s: float)
 
 
 def _sample_rotation(lasting_s: float, face: Face, rotation: Array) -> tuple[Array, Array]:
-    """Return rates (n, 3) and the vertical (n, 3), both in the item's axes, during a rotation from a face."""
+    """Return the rates (n, 3) and the vertical (n, 3), in the item's axes, during a smooth rotation.
+
+    At its start, `face` is up; `rotation` is the rotation vector (3,), zero for a rest.
+    """
     count = round(lasting_s * SAMPLE_RATE_HZ)
     fraction, up = (np.arange(count) + 0.5) / count, np.tile(axis_of(face), (count, 1))
     if rotation.any():
@@ -94,7 +98,7 @@ def _sample_rotation(lasting_s: float, face: Face, rotation: Array) -> tuple[Arr
 
 
 def _rotation(face: Face, move: Instruction) -> Array:
-    """Return the rotation vector (3,), in the item's axes, of a move from the face that is up."""
+    """Return the rotation vector (3,), in the item's axes, of a move at whose start `face` is up."""
     up, target = axis_of(face), axis_of(move.face)
     if move.turns:
         return 2 * np.pi * move.turns * up

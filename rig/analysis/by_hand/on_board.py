@@ -22,9 +22,11 @@ BIAS_LIMIT_RAD_S = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class BoardReadings:
-    """Readings (n, 3), rad/s, with the times (n,) of the board's counter and their sequence numbers (n,).
+    """The n readings of a session, as received from the board.
 
-    `microsecond_s`: the duration of the counter's microsecond.
+    - `times_us`, `sequence` (n,): times of the board's counter, and sequence numbers.
+    - `rates` (n, 3): the readings, rad/s.
+    - `microsecond_s`: the true duration of one microsecond of the counter.
     """
 
     times_us: NDArray[np.integer]
@@ -35,7 +37,7 @@ class BoardReadings:
 
 @dataclass(frozen=True, slots=True)
 class HandAgreement:
-    """A solution in double precision, and the largest differences of the board's matrix and bias from it."""
+    """The host's solution in double precision, and the largest differences of the board's matrix and bias from it."""
 
     host: BoardSolution
     matrix_difference: float
@@ -45,7 +47,7 @@ class HandAgreement:
 def compare_with_board(
     readings: BoardReadings, reports: Sequence[HandReport], solved: BoardHandSolution
 ) -> HandAgreement:
-    """Return how the board's solution agrees with a solution in double precision from the same readings.
+    """Return a solution in double precision from the board's `readings`, and how much the board's solution differs.
 
     Raise Fault `board_unverified` if readings or reports are missing, `board_disagrees` if the limits are exceeded.
     """
@@ -74,7 +76,11 @@ def _moves(readings: BoardReadings, reports: Sequence[HandReport]) -> Iterator[B
 
 
 def _move(readings: BoardReadings, report: HandReport, *, follows: bool) -> BoardMove:
-    """Return the readings of a move that the board accepted. Raise Fault unless all of them arrived."""
+    """Return the readings of a move that the board accepted, and of the rests before and after it.
+
+    `follows`: whether the rest before it is also that of another accepted move. Raise Fault `board_unverified` unless
+    all readings arrived.
+    """
     assert report.before is not None and report.after is not None, "accepted moves are between faces"
     times_us, rates = readings.times_us, readings.rates
     marks = [report.rest_us, report.move_us, report.after_us, report.end_us]

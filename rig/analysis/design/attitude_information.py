@@ -28,9 +28,11 @@ MAX_CONDITION = 100.0  # the worst of a thousand random sets of ten has 19; beyo
 
 @dataclass(frozen=True, slots=True)
 class AttitudeAccount:
-    """How well `count` attitudes determine the model of the chosen `order`, and each sensor's expected uncertainty.
+    """How well `count` attitudes determine an accelerometer's model of the chosen `order`.
 
-    `first` and `second` are the identifiability of the models of order 1 and 2; `g_efficiency` is for the chosen order.
+    - `first`, `second`: the identifiability of the models of order 1 and 2.
+    - `g_efficiency`: the G-efficiency of the attitudes for the chosen order.
+    - `attitude_std_rad`: the standard deviation of the arm's attitude error; `sensors`: each sensor's expected stds.
     """
 
     count: int
@@ -48,9 +50,10 @@ class AttitudeAccount:
 
 
 def attitude_account(config: RigConfig, plan: Plan) -> AttitudeAccount | None:
-    """Return the expected accuracy of a plan's attitudes, for nominal arm and noise; None if attitudes are not used.
+    """Return how accurately a plan's attitudes determine accelerometers, given the nominal errors of arm and sensors.
 
-    Repeats of an attitude average only noise, not the arm's error. Raise Refused `rank_deficient`, `ill_conditioned`.
+    Repeats of an attitude reduce noise, but not the arm's error. Return None if the procedure calibrates no
+    accelerometer. Raise Refused `rank_deficient` or `ill_conditioned` if the attitudes do not determine the model.
     """
     order = config.procedure.accelerometer_order
     if order == 0:
@@ -92,7 +95,7 @@ def _sum_durations(dwells: Sequence[Dwell]) -> dict[Joints, float]:
 
 
 def _attitudes(poses_rad: Sequence[Joints]) -> Array:
-    """Return the attitudes (N, 3, 3) from the flange into the base."""
+    """Return the rotations (N, 3, 3) from the flange's frame into the base's, for each pose."""
     attitudes: Array = np.swapaxes(flange_attitude(np.array(poses_rad)), -1, -2)
     return attitudes
 

@@ -53,10 +53,10 @@ READING_TIME_STD_S = 0.9e-3  # standard deviation of the time of a reading withi
 
 
 def predict_budgets(config: RigConfig, plan: Plan, turner: TurnerIdentity) -> dict[str, Budget]:
-    """Return the predicted budget of each sensor to calibrate, by the method that solves runs of this turner.
+    """Return the predicted budget of each sensor to calibrate, by sensor name.
 
-    If single readings of the turner's angle scatter, that method uses only the speeds. Raise Fault as the estimators do
-    if the plan determines too little, Refused as `settings_of` does.
+    The method is the one that solves runs of this turner: if readings of its angle scatter, the six-observation method,
+    which uses only the speeds, else the vector model. Raise Fault as these do, Refused as `settings_of` does.
     """
     run = plan_run(config, plan, turner.kinematics)
     return {name: _budget(config, run, turner, name, sensor) for name, sensor in config.to_calibrate.items()}
@@ -101,14 +101,17 @@ def _mounting_rotation(angle_deg: float) -> Array:
 
 
 def _simulate_readings(inputs: VectorInputs, matrix: Array) -> Array:
-    """Return simulated readings (N, 3) of a sensor with matrix F (3, 3), with noise, so that no two are equal."""
+    """Return simulated mean readings (N, 3) of a sensor with matrix F (3, 3), with noise, so that no two are equal."""
     noise = np.random.default_rng(len(inputs.windows_s)).standard_normal((len(inputs.windows_s), 3))
     readings: Array = inputs.rates_rad_s @ matrix.T + np.sqrt(inputs.variances_rad2_s2) * noise
     return readings
 
 
 def _clock(uncertainty: Uncertainty, *, on_board: bool) -> ClockCheck:
-    """Return the clock comparison of a run: the controller's clock, the computer's and the board's crystal."""
+    """Return the comparison of the controller's clock that a run would have, with no difference from other clocks.
+
+    The other clocks are the computer's and, if `on_board`, the board's crystal.
+    """
     stated = {
         COMPUTER_CLOCK: uncertainty.computer_clock_ppm,
         **({CRYSTAL_CLOCK: uncertainty.crystal_ppm} if on_board else {}),
@@ -151,7 +154,7 @@ def _plan_recording_part(
 
 
 def _average(timed: Timed[Step], run: PlannedRun, sensor: SensorSection) -> Average:
-    """Return the planned average of a step: zero, with the variance due to the white noise of the data sheet."""
+    """Return a planned average over a step: its mean is zero, its variance that of the data sheet's white noise."""
     start_s, end_s = timed.window_s
     lasting_s, walk_rad_sqrt_s = end_s - start_s, PARTS[sensor.part].angle_random_walk_rad_sqrt_s
     samples = max(round(lasting_s * sensor.rate_hz), 2)
@@ -169,7 +172,10 @@ def _average(timed: Timed[Step], run: PlannedRun, sensor: SensorSection) -> Aver
 
 
 def _plan_observation(timed: Timed[Sweep], run: PlannedRun, sensor: SensorSection, speed_std: float) -> Observation:
-    """Return the observation that a planned sweep would give, without noise; `speed_std` is relative."""
+    """Return the observation that a planned sweep would give; `speed_std` is relative to the speed.
+
+    Its mean reading is zero, but has the variance of the sensor's noise.
+    """
     sweep, turn = timed.step, predict_revolution(timed, run.arm, np.array(run.settings.mount))
     axis, sign = nearest_axis(mounting_matrix(sensor.mounting) @ turn.axis_flange)
     return Observation(
@@ -191,9 +197,10 @@ def _plan_observation(timed: Timed[Sweep], run: PlannedRun, sensor: SensorSectio
 
 
 def _scatter(config: RigConfig, sweep: Sweep, turner: TurnerIdentity) -> float:
-    """Return the relative standard deviation of the mean speed of a shaft whose single readings scatter.
+    """Return the relative standard deviation of a sweep's mean speed, due to the scatter of a servo's angle readings.
 
-    The speed is that of readings one revolution apart: see `rig.observation.motion.turn_speed`.
+    The speed is computed from readings one revolution apart (`rig.observation.motion.turn_speed`). It is 0 for other
+    turners.
     """
     if not turner.reading_std_rad or not isinstance(config.turner, ServoSection):
         return 0.0

@@ -15,7 +15,10 @@ NO_BUDGETS: Mapping[str, Budget] = MappingProxyType({})
 
 @dataclass(frozen=True, slots=True)
 class ReachedUncertainty:
-    """The largest U of any axis, for scale and bias of gyroscopes and of accelerometers; 0 without such sensors."""
+    """The largest U of any axis and sensor: of scale and bias of gyroscopes, then of accelerometers.
+
+    The last two are 0 without accelerometers.
+    """
 
     scale: float
     bias_rad_s: float
@@ -26,7 +29,7 @@ class ReachedUncertainty:
     def worst_case(
         cls, rates: Mapping[str, Budget], accelerations: Mapping[str, Budget] = NO_BUDGETS
     ) -> "ReachedUncertainty":
-        """Return the worst U in the budgets of all gyroscopes, and of all accelerometers."""
+        """Return the largest U in the budgets of all gyroscopes, and in those of all accelerometers."""
         return cls(*_worst_expanded(rates), *_worst_expanded(accelerations))
 
 
@@ -39,7 +42,7 @@ class Budgets:
 
     @property
     def reached(self) -> ReachedUncertainty:
-        """The worst U of the budgets."""
+        """The largest U of the budgets."""
         return ReachedUncertainty.worst_case(self.rates, self.accelerations)
 
     def omit(self, names: Collection[str]) -> "Budgets":
@@ -72,7 +75,7 @@ class TargetUncertainty:
 
 
 def target_of(section: SixObservationSection) -> TargetUncertainty | None:
-    """Return the target at which a run of several repeats ends; None if the run makes all repeats."""
+    """Return the target at which a run stops repeating its sweeps; None if it has none, and makes all repeats."""
     if not section.has_target:
         return None
     return TargetUncertainty(section.target_scale_u or inf, section.target_bias_u_rad_s or inf)
@@ -85,8 +88,9 @@ TARGET_NAMES = tuple(ReachedUncertainty.__dataclass_fields__)  # fields of `Targ
 class Candidate:
     """A possible procedure, and its duration.
 
-    Candidates of one `family` differ in `sizes` (turns, repeats, dwells), and in `rests_s` after sweeps. Larger sizes
-    never give a larger U, but longer rests may, because the bias drifts.
+    Candidates of one `family` differ only in `sizes` (such as the numbers of turns, repeats and dwells), and in
+    `rests_s`, the durations of rests after sweeps. Larger sizes never give a larger U, but longer rests may, because
+    the bias drifts.
     """
 
     procedure: ProcedureSection
@@ -96,7 +100,7 @@ class Candidate:
     rests_s: tuple[float, ...] = ()
 
     def is_contained_in(self, other: "Candidate") -> bool:
-        """Return whether another candidate contains this one, so that this one's U is at least the other's."""
+        """Return whether the `other` has the same rests and no smaller sizes, so that its U is not larger."""
         return (self.family, self.rests_s) == (other.family, other.rests_s) and all(
             size <= other_size for size, other_size in zip(self.sizes, other.sizes, strict=True)
         )
@@ -117,9 +121,12 @@ class PlannedCandidate:
 
 @dataclass(frozen=True, slots=True)
 class SearchResult:
-    """The result of a search: the `best` candidate, the shortest that meets the target, and all evaluated budgets.
+    """The result of a search.
 
-    `nearest`: the evaluated candidate with the smallest ratio to the target. Either is None if no candidate qualifies.
+    - `best`: the shortest candidate that meets the target, None if none does.
+    - `nearest`: the evaluated candidate with the smallest ratio of U to the target, None if none was evaluated.
+    - `evaluated`: the budgets of all evaluated candidates.
+    - `candidates_count`: the number of all candidates that are short enough.
     """
 
     best: PlannedCandidate | None = None
@@ -132,11 +139,13 @@ class SearchResult:
 class ShortestRun:
     """The shortest run for a target.
 
-    - `before`: the procedure in the file, None if its uncertainty cannot be predicted.
-    - `best`, `nearest`: as in `SearchResult`.
-    - `endless`: the budgets of all evaluated plans, and those of a run of unlimited length for each family.
-    - `unreachable`: whether no run of this kind meets the target, however long.
-    - `directions` (N, 3): the sweeps' directions, None if there are none.
+    - wanted: the target.
+    - before: the procedure in the configuration file, None if its uncertainty cannot be predicted.
+    - best, nearest: as in `SearchResult`.
+    - endless: the budgets of all evaluated plans, and those of a run of unlimited length for each family.
+    - unreachable: whether no run of this kind meets the target, however long.
+    - tried: the number of candidates that were evaluated, of `candidates_count` in all.
+    - directions (N, 3): the sweeps' directions, None if there are none.
     """
 
     wanted: TargetUncertainty
@@ -150,7 +159,7 @@ class ShortestRun:
     directions: Array | None
 
     def least(self, size: str) -> Budgets:
-        """Return the budgets of the run in which the U called `size`, a field of `ReachedUncertainty`, is smallest."""
+        """Return the budgets of the run with the smallest value of `size`, a field of `ReachedUncertainty`."""
         return min(self.endless, key=lambda candidate: float(getattr(candidate.reached, size)))
 
     @property
@@ -164,8 +173,8 @@ def find_shortest(
 ) -> SearchResult:
     """Return the shortest candidate whose predicted U meets the target.
 
-    If a candidate meets the target, longer candidates are not tried; if it does not, the candidates that it contains
-    are not tried. `predict` returns None for a candidate that cannot be run.
+    If a candidate meets the target, longer candidates are not tried; if it does not, those contained in it are not
+    tried. `predict` returns a candidate's budgets, None if it cannot be run.
     """
     remaining = sorted(
         (candidate for candidate in candidates if candidate.duration_s <= target.at_most_s),
@@ -193,7 +202,7 @@ def find_shortest(
 
 
 def _worst_expanded(budgets: Mapping[str, Budget]) -> tuple[float, float]:
-    """Return the largest U of a scale factor and of a bias."""
+    """Return the largest U of any scale factor and of any bias in the budgets, 0 if there are none."""
     expanded = [budget.expanded for budget in budgets.values()]
     scale, bias = (
         max((float(uncertainty[columns].max()) for uncertainty in expanded), default=0.0)

@@ -24,9 +24,10 @@ class PlannedSegments:
     with_transfers: Segments
 
     def read_with(self, matrix: Array, angle_random_walk_rad_sqrt_s: float, rate_hz: float) -> "PlannedSegments":
-        """Return the segments with the readings of a sensor with matrix F (3, 3) and this angle random walk.
+        """Return the segments with the mean readings of a sensor with matrix F (3, 3), and with their variances.
 
-        Transfers are omitted if samples are too far apart to resolve them.
+        The variances are those of the angle random walk. Transfers are omitted if samples at `rate_hz` are too far
+        apart to resolve them.
         """
 
         def read(segments: Segments) -> Segments:
@@ -77,7 +78,10 @@ def plan_segments(run: PlannedRun) -> PlannedSegments:
 
 
 def _list_parts(plan: Plan, motion: ArmMotion) -> Iterator[_PlannedSegment]:
-    """Yield a plan's parts as `rig.observation.consistency.segments` divides a recording: sweeps, then rests."""
+    """Yield the segments of all sweeps, then of all rests.
+
+    The plan is divided as `rig.observation.consistency.segments` divides a recording.
+    """
     parts, parts_of_rest = segment_counts(len(plan.sweeps))
     for index, sweep in enumerate(time_steps_of(plan, Sweep)):
         yield from _cut_window(motion, sweep.window_s, index, parts)
@@ -92,7 +96,7 @@ def _cut_window(motion: ArmMotion, window_s: tuple[float, float], sweep: int, pa
 
 
 def _find_transfers(plan: Plan, motion: ArmMotion) -> list[MotionInterval]:
-    """Return the wrists' transfers before, between and after all measurements."""
+    """Return the transfers by wrists alone, before, between and after the plan's measurements."""
     measured_s = [
         time_s for measuring_step in measuring_steps(plan) for time_s in (measuring_step.start_s, measuring_step.end_s)
     ]

@@ -34,8 +34,8 @@ class DetectionLimits:
 def predict_limits(config: RigConfig, plan: Plan, turner: DenavitHartenberg) -> DetectionLimits:
     """Return the predicted detection limits of the gyroscopes to calibrate and, on an arm, of the accelerometers.
 
-    The `turner` is nominal, the noise is that of the data sheet, and flicker is the only bias drift. Of a plan over
-    temperature, only the sweeps before the wait for its second temperature are used.
+    The `turner` is nominal, the noise is that of the data sheet, and flicker is the only bias drift. If a plan visits
+    several temperatures, only the steps at the first one are used.
     """
     if turner.joints == 0:
         return DetectionLimits({}, {})
@@ -64,7 +64,7 @@ def predict_limits(config: RigConfig, plan: Plan, turner: DenavitHartenberg) -> 
 
 
 def _one_set(plan: Plan) -> Plan:
-    """Return the plan up to the wait for its second temperature."""
+    """Return the plan's steps at its first temperature: those before the wait for the second."""
     waits = [index for index, step in enumerate(plan.steps) if isinstance(step, Rest) and step.for_temperature]
     return replace(plan, steps=plan.steps[: waits[1]]) if len(waits) > 1 else plan
 
@@ -78,7 +78,10 @@ def _gyroscope_limits(
     *,
     by_arm: bool,
 ) -> tuple[DetectionLimit, ...]:
-    """Return the detection limits of one gyroscope, from the plan's segments with the data sheet's noise."""
+    """Return the detection limits of one gyroscope, from the plan's segments with the data sheet's noise.
+
+    `by_arm`: whether an arm turns the sensor, whose states have jitter and noise.
+    """
     matrix, full_scale_rad_s = mounting_matrix(sensor.mounting), float(np.radians(sensor.range_deg_s))
     readings = segments.read_with(matrix, PARTS[sensor.part].angle_random_walk_rad_sqrt_s, sensor.rate_hz)
     times_s = readings.segments.times_s.mean(axis=1)

@@ -49,7 +49,7 @@ def plan_run(config: RigConfig, plan: Plan, arm: DenavitHartenberg) -> PlannedRu
 
 @dataclass(frozen=True, slots=True)
 class Timed(Generic[StepT_co]):
-    """A step with its start and end, and the joint angles at its start."""
+    """A step of a plan with its start and end, and the joint angles at its start."""
 
     step: StepT_co
     start_s: float
@@ -75,7 +75,7 @@ def time_steps(plan: Plan) -> Iterator[Timed[Step]]:
 
 
 def time_steps_of(plan: Plan, kind: type[StepT]) -> list[Timed[StepT]]:
-    """Return the plan's steps of one kind, sweeps or dwells, with their times."""
+    """Return the plan's steps of a class, such as `Sweep` or `Dwell`, with their times."""
     return [
         Timed(time_step.step, time_step.start_s, time_step.end_s, time_step.q_rad)
         for time_step in time_steps(plan)
@@ -89,13 +89,16 @@ def measuring_steps(plan: Plan) -> Iterator[Timed[Step]]:
 
 
 def predict_state_jitter(plan: Plan) -> float:
-    """Return the jitter, s, of an arm's states that sweeps will show, including the noise of the encoders."""
+    """Return the standard deviation, s, of the times of an arm's states, including the effect of encoder noise."""
     slow_s_rad = np.mean([1 / sweep.speed_rad_s**2 for sweep in plan.sweeps]) if plan.sweeps else 0.0
     return float(np.sqrt(STATE_JITTER_S**2 + ENCODER_NOISE_RAD**2 * slow_s_rad)) * INTERPOLATION_JITTER_RATIO
 
 
 def predict_revolution(timed_step: Timed[Sweep], arm: DenavitHartenberg, mount: Array) -> Revolution:
-    """Return a sweep's revolution, or arc, as `ArmMotion.turn` finds it in a recording, with a mount (3, 3)."""
+    """Return a planned sweep's revolution or arc, in the form in which `ArmMotion.turn` finds it in a recording.
+
+    `mount` (3, 3) takes vectors from the flange's frame into the item's.
+    """
     sweep, start_q_rad = timed_step.step, timed_step.step.first_q_rad
     return Revolution(
         *timed_step.window_s,
@@ -110,7 +113,10 @@ def predict_revolution(timed_step: Timed[Sweep], arm: DenavitHartenberg, mount: 
 
 
 def predict_attitude(timed_step: Timed[Step], arm: DenavitHartenberg, mount: Array) -> Array:
-    """Return the mean attitude (3, 3) of a revolution, rest or dwell, as `ArmMotion.attitude` finds it."""
+    """Return the mean attitude (3, 3) of a planned revolution, rest or dwell, as `ArmMotion.attitude` would find it.
+
+    `mount` (3, 3) takes vectors from the flange's frame into the item's.
+    """
     if not isinstance(timed_step.step, Sweep):
         return mount @ _attitude(timed_step.q_rad, arm)
     return mount @ _mean_attitude(
@@ -132,7 +138,7 @@ def _mean_attitude(first_q_rad: Joints, joint: int, turned_rad: float, arm: Dena
 
 
 def predict_motion(plan: Plan, arm: DenavitHartenberg) -> ArmMotion:
-    """Return the motion of a chain of joints without vibration. Raise Fault `no_motion` if nothing moves."""
+    """Return the motion of a plan without vibration. Raise Fault `no_motion` if nothing moves."""
     time_s = np.arange(0.0, plan.duration_s + 2 * END_REST_S, 1 / STATE_RATE_HZ)
     states = np.zeros(len(time_s), state_dtype(arm.joints))
     states["time_s"] = time_s

@@ -36,12 +36,12 @@ class PlannedAccelerometer:
 
     @property
     def datasheet(self) -> Datasheet:
-        """The data sheet's limits of the sensor's errors outside the model."""
+        """The stated errors of the sensor that the calibration does not estimate."""
         return read_datasheet(self.run.uncertainty, self.name, self.range_m_s2)
 
 
 def list_accelerometers(config: RigConfig, run: PlannedRun) -> list[PlannedAccelerometer]:
-    """Return the accelerometers of the sensors to calibrate, in a run."""
+    """Return the accelerometers of all sensors to calibrate in a run."""
     return [
         PlannedAccelerometer(run, name, sensor, range_m_s2(sensor.acceleration))
         for name, sensor in config.to_calibrate.items()
@@ -50,9 +50,9 @@ def list_accelerometers(config: RigConfig, run: PlannedRun) -> list[PlannedAccel
 
 
 def predict_readings(accelerometer: PlannedAccelerometer) -> ReferenceModel:
-    """Return an accelerometer's predicted readings, with the noise of its data sheet.
+    """Return an accelerometer's predicted readings, with the variances due to the noise of its data sheet.
 
-    As in a run, the last repeat of the attitudes is held out.
+    As in the solution of a run, the last repeat of the attitudes is left out.
     """
     run, mounting, second_order = (
         accelerometer.run,
@@ -97,7 +97,7 @@ def _segment(timed_step: Timed[Dwell] | Timed[Sweep]) -> ReferenceWindow:
 
 
 def _predict_sweep(timed_step: Timed[Sweep], arm: DenavitHartenberg, walk_m_s_sqrt_s: float) -> SweptAcceleration:
-    """Return a sweep's first harmonic without signal, but with the covariance due to a velocity random walk, m/s/√s."""
+    """Return a sweep's first harmonic, zero, with the covariance due to the velocity random walk `walk_m_s_sqrt_s`."""
     turn = predict_revolution(timed_step, arm, np.eye(3))
     waves = np.diag(np.repeat([1.0, 2.0, 2.0], 3))  # weights of the mean, the cosine and the sine over a revolution
     harmonic = FirstHarmonic(

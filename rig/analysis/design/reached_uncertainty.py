@@ -12,7 +12,7 @@ from rig.errors import Fault
 
 
 def assess_reached(runs: Sequence[RunData], estimator: str) -> ReachedUncertainty | None:
-    """Return the worst U of all sensors to calibrate, from the recordings so far; None if a sensor has no U yet."""
+    """Return the largest U of all sensors to calibrate, from the recordings so far; None if a sensor has no U yet."""
     settings = runs[0].settings
     try:
         with solvable():

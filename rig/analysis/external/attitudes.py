@@ -46,13 +46,15 @@ ROUNDING_RATIO = 1e-9  # standard deviation over mean, below which all readings 
 class AttitudeCalibration:
     """One quantity's calibration by the chosen method.
 
-    - `triad`: scale and axes; `budget`: the contributors to the uncertainty.
-    - `other_methods`: the solutions by the other methods, or the Fault of a method that fails.
-    - `measurements`: the mean readings with their attitudes; `dwells`: the same with their times.
-    - `reference_fault`: the Fault that says why a gyroscope's estimated reference is not the Earth's rate, or None.
-    - `laid`: the solution with placement errors, None by methods without them.
-    - `unplaced_rests`: the number of rests without an attitude that contribute to `laid`.
-    - `moving`: the number of rows left out because the body moved.
+    - triad: scale and axes.
+    - other_methods: the solutions by the other methods, or the Fault of a method that fails.
+    - budget: the contributors to the uncertainty.
+    - measurements: the mean readings with their attitudes.
+    - reference_fault: the Fault that says why a gyroscope's estimated reference is not the Earth's rate, or None.
+    - laid: the solution with placement errors, None by methods without them.
+    - unplaced_rests: the number of rests without an attitude that contribute to `laid`.
+    - moving: the number of rows left out because the body moved.
+    - dwells: the placements with their mean readings and times; empty for a gyroscope.
     """
 
     solution: TriaxialSolution

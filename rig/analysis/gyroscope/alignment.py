@@ -40,8 +40,9 @@ class RelativeRotation:
 
     - `matrix` (3, 3): from a vector in the reference's frame to the sensor's.
     - `std_rad` (3,): standard deviations of small rotations about the sensor's x, y, z, from the readings' noise alone.
-    - `from_nominal_rad` (3,): rotation vector from the nominal mountings, in the sensor's frame.
-    - `residuals_rad_s` (n, 3): the effects of noise, errors of scale and bias, and non-orthogonality.
+    - `from_nominal_rad` (3,): the rotation by which `matrix` differs from that of the nominal mountings, as a rotation
+      vector in the sensor's frame.
+    - `residuals_rad_s` (n, 3): the sensor's mean rates minus the rotated ones of the reference.
     """
 
     matrix: Array
@@ -51,7 +52,7 @@ class RelativeRotation:
 
     @property
     def vector_rad(self) -> Array:
-        """The rotation vector (3,) in rad."""
+        """The rotation vector (3,) of `matrix`, in rad."""
         return rotation_vectors(self.matrix)
 
 
@@ -68,10 +69,8 @@ def collect_mean_rates(observations: Sequence[Observation], calibration: LinearC
 def fit_rotation(sensor: MeanRates, reference: MeanRates, nominal: Array) -> RelativeRotation:
     """Return the rotation R that minimises Σ ‖sensor − R reference‖²; `nominal` is R for the nominal mountings.
 
-    This is Wahba's problem, solved by SciPy (Kabsch 1976). For an error δθ of R and a rate r of the reference, the
-    sensor reads R r + δθ × R r to first order, so the standard deviation of δθ is that of a linear least-squares
-    estimate with the noise of both sensors. R is independent of errors of scale, which are parallel to the axes of
-    rotation, and of biases, which cancel between both directions. Raise Fault `rank_deficient`.
+    R is independent of errors of scale, which are parallel to the axes of rotation, and of biases, which cancel between
+    both directions. Raise Fault `rank_deficient` if all revolutions are about one axis.
     """
     from scipy.spatial.transform import Rotation
 
@@ -85,8 +84,10 @@ def fit_rotation(sensor: MeanRates, reference: MeanRates, nominal: Array) -> Rel
             "is not known",
             "Sweep about at least two different axes",
         )
-    matrix = Rotation.align_vectors(sensor.rate_rad_s, v)[0].as_matrix()
+    matrix = Rotation.align_vectors(sensor.rate_rad_s, v)[0].as_matrix()  # Wahba's problem (Kabsch 1976)
     expected = reference.rotate(matrix)
+    # For an error δθ of R and a rate r of the reference, the sensor reads R r + δθ × R r to first order. So the
+    # covariance of δθ is that of a linear least-squares estimate, with the noise of both sensors.
     by_rotation = np.cross(
         np.eye(3), expected.rate_rad_s[:, None, :]
     )  # [n, j]: change by a small rotation about axis j

@@ -45,17 +45,17 @@ class SensorResult:
 
     - sensor: the sensor as recorded.
     - solution: the estimate by the chosen estimator.
-    - vector_model: the solution of the vector model.
-    - uncertainty: the budget; None for other estimators than "vector" and "newton".
+    - vector_model: the solution of the vector model, None if it has none.
+    - uncertainty: the budget of `solution`; None for estimators without one.
     - corrected_by: the correction for the board and calibration.h.
-    - explained: the vector model with gravity and bias drift, None without a solution.
+    - explained: the fit of the vector model with gravity and bias drift, None without a solution from a run.
     - six_observation: the exact solution of the six-observation model (the paper SIX).
     - algorithm_1: the solution of the same model by the paper's Algorithm 1.
     - observations: the averages of the sweeps.
     - rests: the averages of the rests.
-    - time_bases: one for each recording.
+    - time_bases: the conversion of the sensor's times to the arm's clock, for each recording.
     - earth: the Earth's rate, None if it was not estimated.
-    - by_hand: the solution if a hand turned the sensor.
+    - by_hand: the solution of a session by hand, None for other recordings.
     - faults: the reasons why parts are missing, by the estimator's name or EARTH_RATE.
     """
 
@@ -113,8 +113,8 @@ def observe_recordings(
 ) -> tuple[ObservedRun, ...]:
     """Return the observations of all recordings of one calibration, without those that have no finished sweep.
 
-    The first recording's thresholds apply to all; `rotations` are the `corrections` of `observe_runs`. Raise Refused
-    `different_sensors`; Fault `duplicated_observation` and those of `observe_run`.
+    The first recording's thresholds apply to all. `rotations` correct the item's nominal mounts, by stage (see
+    `observe_runs`). Raise Refused `different_sensors`; Fault `duplicated_observation` and those of `observe_run`.
     """
     refuse_different_sensors(runs)
     _check_recordings(runs)
@@ -138,11 +138,11 @@ def solve_observed(
     estimator: str = DEFAULT_ESTIMATOR,
     matrix_corrected: Collection[str] = (),
 ) -> dict[str, SensorResult]:
-    """Return the calibrations of `sensors`, by name, from all recordings, which share the `environment`.
+    """Return the calibrations of the gyroscopes `sensors`, by name, from all recordings of a run.
 
-    With the vector model, sensors in `matrix_corrected` are corrected by the whole matrix; all other corrections assume
-    orthogonal axes. For every estimator, sweeps must suffice for the six-observation solution. Raise Refused
-    `unknown_estimator`; Fault `duplicated_observation` and as the estimators do.
+    If the estimator is the vector model, sensors named in `matrix_corrected` are corrected by the whole matrix; all
+    other corrections assume orthogonal axes. Sweeps must suffice for the six-observation solution, even if another
+    estimator is chosen. Raise Refused `unknown_estimator`; Fault `duplicated_observation` and as the estimators do.
     """
     chosen = find_estimator(estimator)
     results = dict[str, SensorResult]()
@@ -162,7 +162,7 @@ def _solve_sensor(
     *,
     whole_matrix: bool,
 ) -> SensorResult:
-    """Return a gyroscope's calibration by the estimator; the other estimators' results or Faults are added."""
+    """Return a gyroscope's calibration by the `estimator`, with the results or Faults of other estimators."""
     parts = [recording.sensors[name] for recording in recordings]
     observations = tuple(observation for part in parts for observation in part.revolutions)
     rests = tuple(rest for part in parts for rest in part.rests)
@@ -233,7 +233,7 @@ def _choose_correction(solution: Estimate, *, whole_matrix: bool) -> Correction:
 def solve_observations(
     observations: Sequence[Observation], estimator: Estimator, rests: Sequence[Average] = ()
 ) -> Estimate:
-    """Return scale and bias by the given `estimator`; only the vector model uses `rests`."""
+    """Return the estimate of scale and bias by the given `estimator`; only the vector model uses `rests`."""
     if estimator == "vector":
         return solve_vector(observations, rests)
     if estimator == "levenberg_marquardt":
@@ -244,7 +244,7 @@ def solve_observations(
 def solve_vector(
     observations: Sequence[Observation], rests: Sequence[Average], nominal_mounting: Array | None = None
 ) -> VectorSolution:
-    """Return the vector model of sweeps about known axes and of rests. Raise Fault as `solve_vector_model` does."""
+    """Return the solution of the vector model from sweeps and rests. Raise Fault as `solve_vector_model` does."""
     averages = [*(observation.average for observation in observations), *rests]
     rates = [observation.speed_rad_s * observation.axis_flange for observation in observations]
     return solve_vector_model(
@@ -257,7 +257,7 @@ def solve_vector(
 
 
 def solve_six_observation(observations: Sequence[Observation], estimator: SixObservationEstimator) -> Solution:
-    """Return the six-observation solution; the weights are inverse variances, or equal for the paper's algorithm."""
+    """Return the six-observation solution; weights are inverse variances, but equal for the paper's "algorithm_1"."""
     accumulated = Accumulator.empty()
     for observation in observations:
         average = observation.average

@@ -63,9 +63,10 @@ class Deviation:
 
 @dataclass(frozen=True, slots=True)
 class RevolutionError:
-    """Mean reading minus mean reference over one revolution or arc.
+    """Mean reading minus mean rate of the reference, over one revolution or arc.
 
-    - `sweep`, `joint_name`, `direction`: the motion; `angle_rad`: the joint's angle, None for a whole revolution.
+    - `sweep`: its index in the plan; `joint_name`, `direction`: the joint that turns, and which way.
+    - `angle_rad`: the angle turned, None for a whole revolution.
     - `error_rad_s`, `std_rad_s` (3,): the difference, and its standard deviation due to noise.
     - `gravity_rad_s` (3,): the part of the error that gravity explains, None if no calibration determines it.
     """
@@ -83,13 +84,15 @@ class RevolutionError:
 class Comparison:
     """A sensor's readings and the reference's over the whole movement: sweeps, rests and transfers.
 
-    - `time_s` (n,): controller time; `reading_rad_s`, `reference_rad_s` (n, 3): in the sensor's frame.
-    - `movement`: the deviation over all n samples; `sweeps`: that over the sweeps with their ramps.
-    - `noise_rad_s` (3,): standard deviation of the difference at rest, from both sensors' noise. A perfect calibration
-      would have this RMS. None without rests.
-    - `revolutions`: the error of each revolution.
-    - `delay_s`, `delay_std_s`: for each recording, the delay of the sensor's filter relative to the reference's, and
-      its standard deviation; empty if no common clock stamps the samples.
+    - time_s (n,): times of the samples on the controller's clock.
+    - reading_rad_s, reference_rad_s (n, 3): readings and the reference's rates, in the sensor's frame.
+    - movement: the deviation over all sweeps and rests.
+    - sweeps: the deviation over the sweeps with their ramps.
+    - noise_rad_s (3,): standard deviation of the difference at rest, due to the noise of both sensors; None without
+      rests. The RMS of a perfect calibration would be the same.
+    - revolutions: the error of each revolution.
+    - delay_s, delay_std_s: for each recording, the delay of the sensor's filter relative to the reference's, and its
+      standard deviation; empty if no common clock stamps the samples.
     """
 
     time_s: Array
@@ -112,8 +115,9 @@ def compare(
 ) -> Comparison:
     """Return the comparison of a sensor's recorded readings with the reference's.
 
-    `rotation` (3, 3) takes vectors from the reference's frame into the sensor's. `gravity_rad_s` (N, 3): the effect of
-    gravity on the readings of each revolution, if given. Raise Fault `no_overlap`, `different_clocks`.
+    `rotation` (3, 3) takes vectors from the reference's frame into the sensor's. `gravity_rad_s` (N, 3) is the part of
+    the difference in each revolution that gravity explains, None if unknown. Raise Fault `no_overlap`,
+    `different_clocks`.
     """
     parts = [_align_recording(recording, sensor, reference, rotation) for recording in recordings]
     return Comparison(
@@ -185,7 +189,7 @@ def _find_delay(recording: ObservedRun, sensor: str, reference: str) -> Delay | 
 
 
 def _mask_covered(time_s: Array, by_s: Array) -> NDArray[np.bool_]:
-    """Return a mask (n,) of the times that lie between the times `by_s` (m,) and not in a gap of these."""
+    """Return a mask (n,) of the times within the range of the times `by_s` (m,), but not in a gap of `by_s`."""
     after = np.searchsorted(by_s, time_s)
     gaps = np.diff(by_s, prepend=-np.inf, append=np.inf)
     close: NDArray[np.bool_] = gaps[after] <= MAX_GAP_INTERVALS * np.median(gaps)
@@ -209,7 +213,10 @@ def _summarise_errors(errors: Sequence[Array]) -> Deviation:
 
 
 def _estimate_noise(rests: Sequence[Array]) -> Array | None:
-    """Return the standard deviation (3,) of the readings at rest about the mean of their rest; None without rests."""
+    """Return the standard deviation (3,) of the differences at rest about the mean of each rest.
+
+    Return None if no rest has enough samples.
+    """
     long_enough = [rest for rest in rests if len(rest) >= MIN_SAMPLES_AT_REST]
     if not long_enough:
         return None
@@ -221,7 +228,7 @@ def _estimate_noise(rests: Sequence[Array]) -> Array | None:
 def _compare_revolutions(
     recordings: Sequence[ObservedRun], sensor: str, reference: Reference, rotation: Array, gravity_rad_s: Array | None
 ) -> tuple[RevolutionError, ...]:
-    """Return the sensor's mean rate minus the reference's, which is rotated into the sensor's axes, in each sweep."""
+    """Return the error of the sensor in each sweep: its mean rate minus the reference's, in the sensor's axes."""
     turns = list_revolutions(sensor, recordings)
     tested = collect_mean_rates(turns)
     expected = collect_mean_rates(list_revolutions(reference.name, recordings), reference).rotate(rotation)

@@ -30,7 +30,7 @@ class Agreement:
     """A sensor's calibration by the board, compared with the host's in double precision.
 
     - `solutions`: the board's solutions, by method.
-    - `not_observed`: the sweeps without an observation by the board, and why.
+    - `not_observed`: a phrase for each sweep that the board could not average, with the reason.
     - `host_scale`, `host_bias_rad_s` (3,): the host's solution, None if there is none.
     - `scale_difference` (relative), `bias_difference_rad_s`: the largest difference on any axis between the host's
       solution and the board's solution in closed form; None if either is missing.
@@ -44,7 +44,7 @@ class Agreement:
     bias_difference_rad_s: float | None
 
     def checks(self, sensor: str) -> tuple[Check, ...]:
-        """Return the two checks of the verdict, which fail if the board's arithmetic is unconfirmed."""
+        """Return the checks of the board's scale and bias, which fail if there is nothing to compare."""
         scale, bias = self.scale_difference, self.bias_difference_rad_s
         return (
             fitness(sensor, "rate", "board_scale", scale, SCALE_LIMIT, parameter="scale"),
@@ -53,7 +53,10 @@ class Agreement:
 
 
 def check_arithmetic(runs: Sequence[RunData], sensor: str) -> Agreement:
-    """Return how board and host agree on one sensor in a run, whose last recording contains the board's solutions."""
+    """Return the comparison of the board's and the host's solution for one sensor of a run.
+
+    The last of the recordings `runs` contains the board's solutions.
+    """
     solutions = {event.solution.method: event for event in _events(runs[-1], sensor) if isinstance(event, BoardSolved)}
     not_observed = _list_unobserved(runs[-1], sensor)
     host = _solve(_list_observations(runs, sensor))
@@ -73,7 +76,7 @@ def check_arithmetic(runs: Sequence[RunData], sensor: str) -> Agreement:
 
 
 def check_observed(run: RunData, sensors: Iterable[str]) -> None:
-    """Raise Fault `board_missed_sweep` if the board missed a sweep; a resumed run repeats it."""
+    """Raise Fault `board_missed_sweep` if the board could not average a sweep, which a resumed run repeats."""
     for sensor in sensors:
         if missed := _list_unobserved(run, sensor):
             raise Fault(
@@ -91,9 +94,9 @@ def _list_unobserved(run: RunData, sensor: str) -> tuple[str, ...]:
 
 @dataclass(frozen=True, slots=True)
 class _BoardObservation:
-    """The mean reading (3,) and the speed of an observation of the board.
+    """The mean reading (3,) of a sweep that the board observed, and its speed.
 
-    `averaged`: whether the host averaged the samples; if not, the mean is the board's own, or NaN if not recorded.
+    `averaged`: whether the mean is the host's. If not, it is the board's own, or NaN if the sweep was not recorded.
     """
 
     mean_rad_s: Array
@@ -113,7 +116,10 @@ def _list_observations(runs: Sequence[RunData], sensor: str) -> list[_BoardObser
 
 
 def _recall_observation(earlier: Sequence[RunData], recalled: BoardRecalled) -> _BoardObservation:
-    """Return the observation from the newest recording that contains it; its values are NaN if no recording does."""
+    """Return an observation that the board stored earlier, from the newest recording that contains it.
+
+    Its values are NaN if no recording does.
+    """
     for run in reversed(earlier):
         if earlier_observations := find_board_averages([run], recalled.sensor, (recalled.sweep,)):
             return _average_observation(run, earlier_observations[recalled.sweep])
@@ -152,8 +158,7 @@ def _count_missing(sequence: NDArray[np.uint32]) -> int:
 def _solve(observations: Sequence[_BoardObservation]) -> tuple[Array, Array] | None:
     """Return scale and bias by the board's method, with equal weights.
 
-    Return None if observations are too few, if samples are other than those that the board reports, or if the host has
-    averaged no observation.
+    Return None if there are too few observations, if a mean is unknown, or if the host has averaged no observation.
     """
     accumulated = Accumulator.empty()
     if not any(observation.averaged for observation in observations):

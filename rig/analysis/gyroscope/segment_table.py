@@ -16,16 +16,18 @@ from rig.observation.consistency.transfers import WristTransfer
 
 @dataclass(frozen=True, slots=True)
 class Segments:
-    """N segments of revolutions and rests: means of their readings.
+    """N segments of revolutions and rests: the means of their readings, and the motion in each.
 
     - sweep (N,): index of the revolution, −1 for a rest; transfers between these have numbers from −2 downwards.
-    - position (N,): from −1 in the first segment of a window to 1 in the last.
+    - position (N,): place of the segment in its revolution or rest, from −1 for the first to 1 for the last.
     - means_rad_s, variances_rad2_s2 (N, 3): mean readings and their variances.
     - rates_rad_s (N, 3): angular rate of the flange in inertial space, in its frame.
     - gravity_m_s2 (N, 3): gravity minus the acceleration of the sensor, in that frame.
     - attitudes (N, 3, 3): from the base into that frame.
     - speed_std (N,): relative standard deviation of the mean speed.
-    - times_s (N, 2): start and end on the clock of the first recording; `intervals` are on their own recording's clock.
+    - times_s (N, 2): start and end on the clock of the first recording.
+    - intervals: the same times on the clock of the segment's own recording, with the arm's motion.
+    - readings: the single readings of each revolution and rest.
     - roundings_rad_s (N, 3): standard uncertainty of each mean due to rounding.
     - unexplained_rad2_s2 (N, 3): part of the variances that neither arm nor noise explains.
     """
@@ -46,7 +48,7 @@ class Segments:
 
 
 def stack_segments(windows: Sequence[SegmentedAverage], explained: VectorFit, site: Site) -> Segments:
-    """Return the segments of a gyroscope's windows, in the order of the means of `explained`.
+    """Return the segments of all `windows`, a gyroscope's revolutions and rests in the order of the fit `explained`.
 
     The Earth's rate is the one in `explained`, which was either estimated or taken from the site.
     """
@@ -86,8 +88,8 @@ def append_transfers(
 ) -> Segments:
     """Return the segments with the transfers appended, numbered downwards from `REST` − 1.
 
-    A transfer's noise is the larger of its own noise and that of other segments over the same duration. The effect of
-    vibration is added, estimated from the rests before and after. `windows` are the averages that `segments` divide.
+    A transfer's variance is the larger of its own and that of other segments over the same duration, plus the effect of
+    vibration, which is estimated from the rests before and after. `windows` are the sweeps and rests of `segments`.
     """
     if not transfers:
         return segments
@@ -123,10 +125,10 @@ def append_transfers(
 
 
 def _vibration_changes(windows: Sequence[SegmentedAverage], explained: VectorFit, times_s: Array) -> Array:
-    """Return the variances (M, 3), rad², of the angle by which vibration adds to the rotation in M transfers.
+    """Return the variances (M, 3), rad², of the angle that vibration adds to the rotation in each of M transfers.
 
-    They are means of the variances in the rests nearest to the start and to the end of each transfer, `times_s` (M, 2)
-    on the clock of the first recording. The `windows` are those of the fit `explained`, in the same order.
+    They are means of the variances in the rests nearest to the transfer's start and to its end, which are `times_s`
+    (M, 2) on the clock of the first recording. `windows` are in the order of the fit `explained`.
     """
     rests = [
         (time_s, window.readings.vibration_rad2)

@@ -24,10 +24,10 @@ from rig.observation.observed_run import ObservedRun
 
 @dataclass(frozen=True, slots=True)
 class EstimatedMount:
-    """The mount of the item in a `stage`, counted from 0, relative to its nominal mount.
+    """The mount of the item in a `stage`, counted from 0.
 
-    `rotation_rad` (3,): rotation vector from the nominal mount, in the item's axes; `std_rad` (3,): the rotation's
-    standard deviations, which are the stated ones if sweeps do not determine the rotation.
+    - `rotation_rad` (3,): the rotation from the nominal mount to this one, as a rotation vector in the item's axes.
+    - `std_rad` (3,): its standard deviations, which are the stated ones if sweeps do not determine it.
     """
 
     stage: int
@@ -43,9 +43,9 @@ class EstimatedMount:
 def observe_as_mounted(
     runs: Sequence[RunData], settings: RunSettings
 ) -> tuple[tuple[ObservedRun, ...], tuple[EstimatedMount, ...]]:
-    """Return the observations of one calibration, made with the item's estimated mounts, and these mounts.
+    """Return the observations of one calibration, computed with the item's estimated mounts, and these mounts.
 
-    The solution of each sensor estimates the remaining errors of second order. Raise as `observe_recordings` does.
+    Errors of second order remain, which the solution of each sensor estimates. Raise as `observe_recordings` does.
     """
     recordings = observe_recordings(runs)
     mounts = _estimate_mounts(recordings, settings)
@@ -79,11 +79,12 @@ def _estimate_mounts(recordings: Sequence[ObservedRun], settings: RunSettings) -
 def _rotation_in_stage(fit: VectorFit, index: int) -> tuple[Array, Array]:
     """Return the item's rotation (3,) in a stage relative to the first, and its standard deviations.
 
-    Both are in units of the mounts' stated standard deviation. A rotation of the item rotates sensed rates oppositely.
+    Both are in units of the stated standard deviation of a mount.
     """
     size = len(fit.mounts)
     pick = np.zeros((3, size))
     pick[:, 3 * index : 3 * index + 3] = np.eye(3)
     pick[:, size - 3 :] = -np.eye(3)
     covariance = pick @ fit.mounts_covariance @ pick.T
+    # The fitted mounts are rotations of the sensed rates, which turn opposite to the item.
     return -pick @ fit.mounts, np.sqrt(np.diag(covariance))

@@ -30,8 +30,8 @@ WAVE_RATIO = 0.3  # of an encoder's error once or twice a revolution to the erro
 class RecordingPart:
     """A sensor's revolutions and rests in one recording.
 
-    Its clock begins `clock_offset_s` after that of the first recording. The item was remounted for each `stage`;
-    `mount` (3, 3) transforms the flange's frame into the item's.
+    The recording's clock begins `clock_offset_s` after that of the first recording. The item was remounted for each
+    `stage`; `mount` (3, 3) transforms the flange's frame into the item's, None if they agree.
     """
 
     turns: Sequence[Observation]
@@ -42,9 +42,9 @@ class RecordingPart:
 
 
 def collect_inputs(recordings: Sequence[ObservedRun], sensor: str, environment: MeasurementEnvironment) -> VectorInputs:
-    """Return the arm's motion and the readings in each average of a sensor, from all recordings of a run.
+    """Return a sensor's mean readings in all sweeps and rests of a run, with the arm's motion in each.
 
-    Speeds are corrected for the controller's clock, because if it runs too fast, the recorded speeds are too small.
+    Speeds are corrected for the error of the controller's clock: if it runs too fast, recorded speeds are too small.
     """
     run = recordings[0].run
     parts = [
@@ -62,7 +62,10 @@ def collect_inputs(recordings: Sequence[ObservedRun], sensor: str, environment: 
 
 
 def combine_recordings(parts: Sequence[RecordingPart], environment: MeasurementEnvironment) -> VectorInputs:
-    """Return the inputs from all recordings of a run, revolutions before rests, without the sensor's properties."""
+    """Return the inputs from all recordings of a run, first all revolutions, then all rests.
+
+    The sensor's properties are not set.
+    """
     site, extension_m = environment.site, np.array(environment.extension_m)
     turns = [turn for part in parts for turn in part.turns]
     averages, offsets_s = _list_averages(parts)
@@ -95,7 +98,7 @@ def combine_recordings(parts: Sequence[RecordingPart], environment: MeasurementE
 
 
 def _list_averages(parts: Sequence[RecordingPart]) -> tuple[list[Average], Array]:
-    """Return the N averages of all parts, revolutions before rests, and the clock's offset (N,) of each, s."""
+    """Return the N averages of all parts, first revolutions, then rests, and the clock offset of each in s (N,)."""
     averages = [turn.average for part in parts for turn in part.turns]
     averages += [rest for part in parts for rest in part.rests]
     counts = [*(len(part.turns) for part in parts), *(len(part.rests) for part in parts)]
@@ -113,7 +116,7 @@ def _describe_recorded(
 def describe_sensor(
     uncertainty: Uncertainty, name: str, full_scale_rad_s: float, temperature_c: Array, temperature_step_k: float
 ) -> SensorProperties:
-    """Return the stated properties of the sensor `name` with its range, and its temperature in each average (N,)."""
+    """Return the stated properties of the sensor `name`, with its range and its temperature in each average (N,)."""
     return SensorProperties(
         nonlinearity=uncertainty.find_stated_size("nonlinearity_percent", name) / 100,
         full_scale_rad_s=full_scale_rad_s,
@@ -126,8 +129,9 @@ def describe_sensor(
 
 
 def lever_arms_m(turns: Sequence[Observation], extension_m: Array, mount: Array | None = None) -> Array:
-    """Return the lever arms (M, 3) from the axis of rotation to the sensors, in the item's frame; zero without a robot.
+    """Return the lever arms (M, 3) from the axis of rotation to the sensors in M sweeps, in the item's frame.
 
+    They are zero if the sweeps do not state them, because no robot turned the item.
     `extension_m` (3,): from the flange to the sensors, in the flange's frame. `mount` (3, 3): rotation from the
     flange's frame to the item's; None if they agree.
     """
@@ -137,7 +141,7 @@ def lever_arms_m(turns: Sequence[Observation], extension_m: Array, mount: Array 
 
 
 def _axis_errors(turns: Sequence[Observation], rests: int, axis_deg: float) -> Array:
-    """Return `axis_errors_rad_s` (P, N, 3) of `VectorInputs`, for angles of the arm with the half-width `axis_deg`."""
+    """Return `VectorInputs.axis_errors_rad_s` (P, N, 3), for errors of the arm's angles of half-width `axis_deg`."""
     steady = np.array([name.startswith(("twist", "zero")) for name in AXIS_ERRORS])
     std = np.radians(axis_deg) / np.sqrt(3) * np.where(steady, 1.0, WAVE_RATIO)
     errors = [std[:, None] * turn.speed_rad_s * turn.axis_errors for turn in turns if turn.axis_errors is not None]
@@ -145,7 +149,10 @@ def _axis_errors(turns: Sequence[Observation], rests: int, axis_deg: float) -> A
 
 
 def _return_errors(turns: Sequence[Observation], rests: int, uncertainty: Uncertainty) -> Array:
-    """Return `VectorInputs.return_errors_rad_s` (P, N, 3), due to joints that return imperfectly to a sweep's axis."""
+    """Return `VectorInputs.return_errors_rad_s` (P, N, 3), due to joints that return imperfectly to an angle.
+
+    Each group of consecutive sweeps about one axis has its own errors.
+    """
     errors = np.array([turn.speed_rad_s * turn.axis_errors for turn in turns if turn.axis_errors is not None])
     tilts = uncertainty.repeatability_std_rad * np.swapaxes(errors[:, ZERO_INDICES], 0, 1)
     visits = np.array([np.isin(np.arange(len(turns)), visit) for visit in _group_by_axis(turns)])
@@ -155,9 +162,9 @@ def _return_errors(turns: Sequence[Observation], rests: int, uncertainty: Uncert
 
 
 def _encoder_errors(turns: Sequence[Observation], rests: int, uncertainty: Uncertainty) -> Array | None:
-    """Return the errors (P, N, 3), as in `VectorInputs`, of a joint's encoder at each angle where arcs begin or end.
+    """Return `VectorInputs.encoder_errors_rad_s` (P, N, 3), one for each angle of a joint where arcs begin or end.
 
-    Sweeps in both directions share these angles, so repeats do not average the errors. Return None if all sweeps are
+    Sweeps in both directions share these angles, so repeats do not reduce the errors. Return None if all sweeps are
     whole turns.
     """
     arcs = [None if turn.arc_rad is None else (turn.joint_name, *turn.arc_rad) for turn in turns]
@@ -175,9 +182,10 @@ def _encoder_errors(turns: Sequence[Observation], rests: int, uncertainty: Uncer
 
 
 def list_mount_rotations(stages: Sequence[int], rests: int, mount_deg: float) -> Array | None:
-    """Return `mount_turns_rad` (3 S, N, 3) of `VectorInputs`, for mounts that may be off by `mount_deg`.
+    """Return `VectorInputs.mount_turns_rad` (3 S, N, 3), for mounts in S stages that may be off by `mount_deg`.
 
-    N rows are the sweeps, whose stages are `stages`, and then `rests`, which no mount affects. None with one stage.
+    `stages` are the stages of all sweeps; the N rows are these sweeps and then `rests` zeros, because mounts do not
+    affect rests. Return None if there is only one stage.
     """
     first, *others = dict.fromkeys(stages)
     if not others:
@@ -200,7 +208,7 @@ def _group_by_axis(turns: Sequence[Observation]) -> list[list[int]]:
 
 
 def list_given(environment: MeasurementEnvironment, name: str) -> EarthRatePrior:
-    """Return what the configuration states of the site, the arm and sensor `name`, for an estimate of Earth's rate."""
+    """Return the prior knowledge for an estimate of the Earth's rate: data of the site, the arm and sensor `name`."""
     site, uncertainty = environment.site, environment.uncertainty
     return EarthRatePrior(
         up=np.array(site.up),
@@ -214,9 +222,9 @@ def list_given(environment: MeasurementEnvironment, name: str) -> EarthRatePrior
 def list_uncertainties(
     environment: MeasurementEnvironment, name: str, earth_rate: EarthRate | None, stamp_std_s: float | None = None
 ) -> UnknownErrors:
-    """Return the uncertainties that no recording of sensor `name` shows, and the uncertainty of the Earth's rate.
+    """Return the stated uncertainties for the budget of sensor `name`, and those of the clock and the Earth's rate.
 
-    `stamp_std_s` is as in `RecordedSensor`.
+    `stamp_std_s` is the standard deviation of the samples' time stamps, None if unknown.
     """
     uncertainty, clock = environment.uncertainty, environment.clock
     return UnknownErrors(

@@ -20,10 +20,12 @@ from rig.observation.observed_run import ObservedRun
 
 @dataclass(frozen=True, slots=True)
 class Verification:
-    """The comparison of uncalibrated (`before`, None if not recorded) and of calibrated readings with a reference.
+    """The comparison of a sensor's readings with a reference, without and with the calibration.
 
-    `reference_error_rad_s`: the largest error of the norm of the reference's mean rate. The arm shows the true norm,
-    2π/T over a revolution and zero over a rest.
+    - `reference_error_rad_s`: the largest error of the magnitude of the reference's mean rate in a revolution or rest;
+      the arm shows the true rate.
+    - `rotation`: that from the reference to the sensor.
+    - `before`: of uncalibrated readings, None if not recorded; `after`: of calibrated readings.
     """
 
     sensor: str
@@ -47,8 +49,8 @@ def verify(
 
     - `before`: the recordings of raw readings from which the `calibration` was estimated. They determine the rotation
       between the sensors; without them, `after` does.
-    - `gravity_rad_s`: gravity's effects (N, 3) on the corrected readings of sensor and of reference in the revolutions
-      of `after`, if estimated.
+    - `gravity_rad_s`: the effects (N, 3) of gravity on the corrected readings of the sensor and on those of the
+      reference in the revolutions of `after`, None if not estimated.
 
     Raise Fault `sensor_missing`, `wrong_mode`, `nothing_to_compare`, `incomplete_verification`, `no_overlap`,
     `different_clocks`, and what `fit_rotation` raises.
@@ -72,7 +74,10 @@ def verify(
 
 
 def _gravity_difference(gravity_rad_s: tuple[Array, Array] | None, rotation: Array) -> Array | None:
-    """Return gravity's effect (N, 3) on the sensor's readings minus that on the reference's, None if not estimated."""
+    """Return gravity's effect (N, 3) on the difference of sensor and reference, in the sensor's frame.
+
+    Return None if gravity's effects were not estimated.
+    """
     if gravity_rad_s is None:
         return None
     on_sensor, on_reference = gravity_rad_s
@@ -85,7 +90,8 @@ def fit_mounting(
 ) -> RelativeRotation:
     """Return the rotation from reference to sensor, fitted to the revolutions of the recordings.
 
-    `calibration` is None if the readings are calibrated. Raise Fault as `fit_rotation` does.
+    `calibration` corrects the sensor's readings; it is None if the board has corrected them already. Raise Fault as
+    `fit_rotation` does.
     """
     described = recordings[0].run.sensors
     return fit_rotation(

@@ -45,9 +45,9 @@ ORDER_REMEDY = "Set procedure.second_order: false, which makes the bias much bet
 
 @dataclass(frozen=True, slots=True)
 class ValidationRepeat:
-    """The last repeat of the attitudes, which is held out of the solution to validate it.
+    """The N dwells of the last repeat of the attitudes, which are held out of the solution to validate it.
 
-    `error_m_s2` (N,): the norm of each calibrated acceleration, minus gravity.
+    `error_m_s2` (N,): the norm of the calibrated acceleration in each dwell, minus gravity.
     """
 
     dwells: tuple[DwellReading, ...]
@@ -63,12 +63,15 @@ class ValidationRepeat:
 class AccelerometerResult:
     """One accelerometer's calibration, reading a = F (s + φ s²) + b of a force s, in the axes of its nominal mounting.
 
-    - `movement`: the readings from which the solution is estimated; `sweeps`: the number of sweeps.
-    - `triad`: scale and axes, with the solution's uncertainty; `budget`: uncertainty of scale and bias from all causes.
-    - `alignment`: rotation from the gyroscope of the same sensor, None if that was not calibrated.
-    - `other_methods`: the solutions from the attitudes alone, by method, or the Fault of a method that fails.
-    - `validation`: the validation, if the attitudes were repeated.
-    - `temperature_c`: the mean of all readings.
+    - movement: the readings from which the solution is estimated.
+    - triad: scale and axes, with the uncertainty of the solution alone.
+    - budget: the uncertainty of scale and bias from all causes.
+    - alignment: rotation from the gyroscope of the same sensor, None if the gyroscope was not calibrated.
+    - other_methods: the solutions from the attitudes alone, by method, or the Fault of a method that fails.
+    - dwells: the dwells used in the solution.
+    - sweeps: the number of sweeps used in the solution.
+    - validation: the errors in the last repeat of the attitudes, None if the attitudes were not repeated.
+    - temperature_c: the mean temperature of the readings, None without a thermometer.
     """
 
     sensor: RecordedSensor
@@ -96,7 +99,7 @@ class AccelerometerResult:
 
     @property
     def bias_m_s2(self) -> Array:
-        """The bias b (3,)."""
+        """The bias b (3,) of the readings."""
         return self.solution.bias_m_s2
 
     @property
@@ -107,7 +110,7 @@ class AccelerometerResult:
 
     @property
     def lever_arm_std_m(self) -> Array | None:
-        """The standard deviations (3,) of the lever arm, in the flange's axes instead of the nominal sensor axes."""
+        """The standard deviations (3,) of the lever arm along the flange's axes; None without sweeps."""
         if self.solution.lever_arm_m is None:
             return None
         std: Array = np.abs(np.array(self.sensor.mounting)).T @ np.sqrt(np.diag(self.solution.covariance)[LEVER])
@@ -116,10 +119,11 @@ class AccelerometerResult:
 
 def calibrate_accelerometers(
     recordings: Sequence[ObservedRun], settings: RunSettings, gyroscopes: Mapping[str, SensorResult] = NO_GYROSCOPES
-) -> Attempts[str, AccelerometerResult]:
-    """Return the calibration, and alignment with the gyroscope, of each sensor with accelerations in dwells, by name.
+) -> dict[str, AccelerometerResult]:
+    """Return the calibration of each sensor's accelerometer, with its alignment to the gyroscope, by sensor name.
 
-    The Faults are `not_all_attitudes`, `second_order_not_seen`, `swapped_axes`, `mirrored_axis`, `wrong_mounting`, and
+    Return nothing if no dwells are planned.
+    Raise Fault `not_all_attitudes`, `second_order_not_seen`, `swapped_axes`, `mirrored_axis`, `wrong_mounting`, and
     what `solve_imu` and `solve_triaxial` raise.
     """
     if not settings.planned_dwells:
@@ -216,7 +220,7 @@ def _calibrate(
 
 
 def _select_planned(dwells: Sequence[DwellReading], settings: RunSettings) -> tuple[PlannedDwell, ...]:
-    """Return the planned dwells; in a calibration over temperature only those that the run reached."""
+    """Return the planned dwells; in a calibration over temperature only those up to the last dwell that was read."""
     if settings.reference_c is None:
         return settings.planned_dwells
     last = max((dwell.index for dwell in dwells), default=-1)
@@ -251,7 +255,7 @@ def select_validation(planned: Sequence[PlannedDwell]) -> frozenset[int]:
 
 
 def stack_sweeps(swept: Sequence[SweptAcceleration], mounting: Array) -> Sweeps:
-    """Return all sweeps, in the axes of the sensor as it is nominally mounted."""
+    """Return the accelerations in all sweeps, as arrays in the axes of the sensor as it is nominally mounted."""
     if not swept:
         return NO_SWEEPS
     stations = list(dict.fromkeys(sweep.station for sweep in swept))
@@ -274,13 +278,13 @@ def _list_swept(name: str, recordings: Sequence[ObservedRun]) -> list[SweptAccel
 
 
 def _readings_dof(dwells: Sequence[DwellReading], swept: Sequence[SweptAcceleration]) -> Array:
-    """Return the degrees of freedom (3 N + 9 M,) of the readings of dwells, then of the harmonics of sweeps."""
+    """Return the degrees of freedom (3 N + 9 M,) of the variances of N dwells, then of the harmonics of M sweeps."""
     still = dof_by_axis(dwell.reading.dof for dwell in dwells).ravel()
     return np.concatenate([still, *(np.full(9, float(sweep.harmonic.dof)) for sweep in swept)])
 
 
 def _align_to_gyroscope(gyroscope: SensorResult, solution: ImuSolution, mounting: Array) -> Alignment | None:
-    """Return the alignment to the gyroscope, in the flange's axes; None without a vector solution."""
+    """Return the rotation from gyroscope to accelerometer in the flange's axes; None without a vector solution."""
     vector = gyroscope.vector_model
     if vector is None:
         return None

@@ -23,7 +23,10 @@ WRIST_ERRORS, CONSTANTS = 6, 2  # the first two are a wrist's twist and zero, th
 
 @dataclass(frozen=True, slots=True)
 class Posture:
-    """The arm's angles (6,) in a dwell, or at a sweep's start, and the wrist (0 to 2) that the sweep turns, if any."""
+    """The arm's joint angles (6,) in a dwell or at a sweep's start.
+
+    `wrist` (0 to 2) is the wrist that the sweep turns, None in a dwell.
+    """
 
     q_rad: Array
     wrist: int | None = None
@@ -31,9 +34,11 @@ class Posture:
 
 @dataclass(frozen=True, slots=True)
 class StatedArm:
-    """The stated kinematics, the half-width of the errors of its angles, and the sensor's nominal mounting (3, 3).
+    """The arm as stated, and the size of its errors.
 
-    `estimated_rad`: standard deviation of the wrists' errors, from the readings; it may exceed the stated one.
+    - `arm`: the kinematics; `axis_deg`: the stated half-width of the errors of its angles.
+    - `mounting` (3, 3): the nominal mounting of the sensor on the flange.
+    - `estimated_rad`: the standard deviation of these errors as estimated from the readings, used if it is larger.
     """
 
     arm: DenavitHartenberg
@@ -43,7 +48,7 @@ class StatedArm:
 
 
 def arm_patterns(theta: Array, movement: Movement, postures: Sequence[Posture], stated: StatedArm) -> Array:
-    """Return the changes (18, 3 K) of the readings that one standard uncertainty of each wrist error causes."""
+    """Return the changes (18, 3 K) of K vector readings by one standard uncertainty of each of 18 errors of wrists."""
     by_turns = arm_effects(theta, replace(movement, sweeps=movement.sweeps.alone()))
     stated_rad = np.radians(stated.axis_deg) / np.sqrt(3) * _error_fractions()
     std_rad = np.maximum(stated_rad, stated.estimated_rad)
@@ -52,13 +57,13 @@ def arm_patterns(theta: Array, movement: Movement, postures: Sequence[Posture], 
 
 
 def list_arm_rotations(postures: Sequence[Posture], arm: DenavitHartenberg, mounting: Array) -> Array:
-    """Return the `arm_turns` (18, 3 N + 10 M) of a `Movement`, for an arm with attitude errors of 1 rad (std)."""
+    """Return `Movement.arm_turns` (18, 3 N + 10 M), for twist and zero errors of the wrists of 1 rad (std)."""
     rotations: Array = _error_fractions()[:, None] * _stack_rotations(postures, arm, mounting)
     return rotations
 
 
 def _error_fractions() -> Array:
-    """Return the size (18,) of the six errors of each wrist, relative to the error that is stated for the arm."""
+    """Return the sizes (18,) of the six errors of each of three wrists, as fractions of the arm's stated error."""
     return np.tile(np.where(np.arange(WRIST_ERRORS) < CONSTANTS, 1.0, WAVE_RATIO), 3)
 
 
@@ -67,11 +72,13 @@ def _stack_rotations(postures: Sequence[Posture], arm: DenavitHartenberg, mounti
 
 
 def _rotations(posture: Posture, arm: DenavitHartenberg, mounting: Array) -> Array:
-    """Return a dwell's columns (18, 3), or a sweep's (18, 10), of `Movement.arm_turns`, per radian of each error."""
+    """Return the part of `Movement.arm_turns` for a dwell (18, 3) or a sweep (18, 10), per radian of each error."""
     in_base = flange_errors(posture.q_rad, arm)
     in_flange = in_base @ (mounting @ flange_attitude(posture.q_rad, arm)).T
     if posture.wrist is None:
         return in_flange.reshape(-1, OWN_ERRORS)
+    # An error between base and turning wrist rotates the whole sweep in the base; an error beyond that wrist rotates it
+    # in the flange's frame. Waves of the turning wrist's own angle change the speed during the sweep instead.
     sizes = np.zeros((*in_base.shape[:2], SHARED_ERRORS))
     for wrist in range(len(in_base)):
         distal = wrist > posture.wrist
@@ -88,7 +95,10 @@ def _rotations(posture: Posture, arm: DenavitHartenberg, mounting: Array) -> Arr
 
 
 def _shift_harmonics(angle_rad: float) -> Array:
-    """Return the matrix (4, 4) that maps the coefficients of two harmonics of θ − `angle_rad` to those of θ."""
+    """Return the matrix (4, 4) that shifts the origin of a curve with two harmonics by `angle_rad`.
+
+    It maps the coefficients of the cosines and sines of θ − `angle_rad` to those of θ.
+    """
     cos, sin, cos_2, sin_2 = angle_waves(angle_rad)
     waves: Array = np.zeros((4, 4))
     waves[:2, :2] = [[cos, -sin], [sin, cos]]

@@ -43,10 +43,12 @@ MICRO_G_PER_MILLI_G = 1000
 
 @dataclass(frozen=True, slots=True)
 class Datasheet:
-    """One accelerometer's data sheet: the half-widths of its errors, and the minimum of its Allan deviation.
+    """The errors of an accelerometer in its data sheet, as half-widths.
 
-    `nonlinearity_percent`: nonlinearity from −`over_g` to `over_g`, in % of `over_g`. `temperature_words`: see
-    `SensorProperties`.
+    - nonlinearity_percent: nonlinearity from −`over_g` to `over_g`, in % of `over_g`.
+    - bias_mg_k, scale_ppm_k: the temperature coefficients of bias and scale.
+    - bias_instability_ug: the minimum of the Allan deviation.
+    - temperature_words: the source of the temperatures, if it is not a thermometer.
     """
 
     nonlinearity_percent: float
@@ -74,7 +76,7 @@ class Datasheet:
 
 
 def read_datasheet(uncertainty: Uncertainty, name: str, range_m_s2: float) -> Datasheet:
-    """Return the data of the accelerometer of the sensor `name`, from its data sheet or the configuration."""
+    """Return the errors of the accelerometer of sensor `name`: those in the configuration, else in the data sheet."""
 
     def read_size(what: ExternalResult) -> float:
         return uncertainty.find_stated_size(what, name)
@@ -90,9 +92,11 @@ def read_datasheet(uncertainty: Uncertainty, name: str, range_m_s2: float) -> Da
 
 @dataclass(frozen=True, slots=True)
 class ReferenceWindow:
-    """A dwell or a sweep: its `number` in the plan, times on the clock of the first recording, and the arm's posture.
+    """A dwell or a sweep, with the arm's `posture`.
 
-    `temperature_c` is the sensor's mean over the `samples`.
+    - `number`: its index in the plan.
+    - `window_s`: start and end on the clock of the first recording.
+    - `temperature_c`: the mean temperature of the sensor over the window's `samples`, which are a number.
     """
 
     number: int
@@ -122,7 +126,7 @@ def list_windows(name: str, recordings: Sequence[ObservedRun], dwells: Sequence[
 
 
 def mean_temperature_c(windows: Sequence[ReferenceWindow]) -> float:
-    """Return the mean temperature of the readings, °C, to which scale and bias refer."""
+    """Return the mean temperature of all samples, °C, to which scale and bias refer."""
     samples = [window.samples for window in windows]
     return float(np.average([window.temperature_c for window in windows], weights=samples))
 
@@ -130,8 +134,9 @@ def mean_temperature_c(windows: Sequence[ReferenceWindow]) -> float:
 def list_sensor_errors(
     datasheet: Datasheet, windows: Sequence[ReferenceWindow], temperature_step_k: float, *, second_order: bool
 ) -> AccelerometerErrors:
-    """Return the errors of a sensor in these windows, without the even part if `second_order` is estimated.
+    """Return the errors of a sensor in these windows.
 
+    If `second_order`, quadratic terms are estimated, so the even part of the nonlinearity is not among the errors.
     `temperature_step_k` is the thermometer's resolution.
     """
     windows_s = np.array([window.window_s for window in windows])
@@ -158,7 +163,7 @@ def add_errors(
     *,
     settings: RunSettings,
 ) -> Movement:
-    """Return the movement together with the modelled errors of the sensor and of the arm in `windows`."""
+    """Return the movement, to which the modelled errors of the sensor and of the arm in its `windows` are added."""
     sensor_errors = list_sensor_errors(datasheet, windows, sensor.unseen_change_k, second_order=settings.second_order)
     rotations = list_arm_rotations([window.posture for window in windows], arm, np.array(sensor.mounting))
     return replace(movement, sensor_errors=sensor_errors, arm_turns=rotations)
@@ -167,10 +172,9 @@ def add_errors(
 def separate_sensor_errors(
     spread: FitUncertainty, theta: Array, movement: Movement, datasheet: Datasheet
 ) -> tuple[FitUncertainty, list[Contributor]]:
-    """Return the uncertainty due to noise and arm, and the contributors of the sensor's own errors in this `movement`.
+    """Return the part of the uncertainty `spread` that is due to noise and arm, and the sensor's own contributors.
 
-    `spread` is the uncertainty of a fit that includes the quadratic terms, in which noise has a larger effect than in a
-    fit without these terms.
+    `spread` is the uncertainty of a fit of the `movement` with the solution `theta`, which includes all these parts.
     """
     drift, flicker = (
         spread.response @ shared @ spread.response.T

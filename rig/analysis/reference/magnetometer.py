@@ -34,12 +34,14 @@ REMEDY = "Take iron and currents away, or measure farther from them; set the sen
 class MagnetometerResult:
     """One magnetometer's calibration, reading m = F B + b of a field B, in the axes of its nominal mounting.
 
-    - `field_t`: the size of the field; `extension_m` (3,): the sensor's position on the flange.
-    - `triad`: scale, relative to `field_t`, and axes, with the statistical uncertainty; `budget`: the total.
-    - `uniformity`: the test of the field over the attitudes.
-    - `drift`: the drift of the field between measurements at the home pose, None if there were fewer than two.
-    - `measurements`: the means from which the solution is estimated, in tesla.
-    - `other_methods`: the solutions by the other methods, or the Fault of a method that fails.
+    - field_t: the size of the field.
+    - extension_m (3,): the sensor's position relative to the flange, in the flange's frame.
+    - uniformity: the test whether the field is the same in all attitudes.
+    - drift: the change of the field between measurements at the home pose, None if there were fewer than two.
+    - triad: scale, relative to `field_t`, and axes, with the uncertainty of the solution alone.
+    - budget: the uncertainty of scale and bias from all causes.
+    - other_methods: the solutions by the other methods, or the Fault of a method that fails.
+    - measurements: the means from which the solution is estimated, in tesla.
     """
 
     sensor: RecordedSensor
@@ -60,9 +62,10 @@ def calibrate_magnetometers(
 ) -> Attempts[str, MagnetometerResult]:
     """Return the calibration of every recorded magnetometer, or its Fault.
 
-    The `accelerometers` bound the error of the arm's attitudes. The Faults are `no_attitudes` without dwells,
-    `field_strength_unknown`, `field_drifts`, `field_not_uniform`, `attitude_untrustworthy`, `swapped_axes`,
-    `mirrored_axis`, `wrong_mounting`, and those of `field_readings` and `solve_triaxial`.
+    The solutions of `accelerometers` show how large the error of the arm's attitudes may be. The Faults are
+    `no_attitudes` without dwells,
+    `field_strength_unknown`, `field_drifts`, `field_not_uniform`, `swapped_axes`, `mirrored_axis`, `wrong_mounting`,
+    and those of `field_readings` and `solve_triaxial`.
     """
     magnetometers = recordings[0].run.measuring(FIELD)
     return attempt_each(
@@ -124,7 +127,10 @@ def _calibrate(
 
 
 def _drift(name: str, recordings: Sequence[ObservedRun], settings: RunSettings) -> FieldDrift | None:
-    """Return the field's drift between tests at home, None without two tests. Raise Fault `field_drifts`."""
+    """Return the field's change between measurements at the arm's home pose; None if there are fewer than two.
+
+    Raise Fault `field_drifts` if noise does not explain the change.
+    """
     tests = [test for run in recordings for test in field_tests(run, name, settings.observation, settings.home_q_rad)]
     if len(tests) < 2:
         return None
@@ -142,7 +148,11 @@ def _drift(name: str, recordings: Sequence[ObservedRun], settings: RunSettings) 
 
 
 def _solve(solve: Callable[..., TriaxialSolution]) -> TriaxialSolution:
-    """Return what `solve` returns. Raise Fault `field_not_uniform` for residuals that attitudes cannot cause."""
+    """Return the solution by `solve`. Raise Fault as `solve` does.
+
+    If the Fault is that the attitudes contradict the readings, raise Fault `field_not_uniform` instead, because the
+    accelerometer has confirmed the attitudes.
+    """
     try:
         return solve(method=ESTIMATOR)
     except Fault as fault:
@@ -155,16 +165,10 @@ def _solve(solve: Callable[..., TriaxialSolution]) -> TriaxialSolution:
 def _attitude_error_rad(
     name: str, recordings: Sequence[ObservedRun], accelerometers: Mapping[str, AccelerometerResult]
 ) -> float:
-    """Return an upper bound (2σ) of the arm's attitude error from an accelerometer, if possible on the same clock.
+    """Return an upper bound of the arm's attitude error, two standard deviations above an accelerometer's estimate.
 
-    Raise Fault `attitude_untrustworthy` if no accelerometer has a solution.
+    The accelerometer is the one that shares the magnetometer's clock, if there is one.
     """
-    if not accelerometers:
-        raise Fault(
-            "attitude_untrustworthy",
-            "no accelerometer has a solution, which would show how exact the arm's attitudes are",
-            "Correct what prevents the accelerometer's solution, then run again",
-        )
     by = next((other for run in recordings if (other := find_companion(run, name)) in accelerometers), None)
     accelerometer = accelerometers[by] if by is not None else next(iter(accelerometers.values()))
     error = accelerometer.solution.attitude_error

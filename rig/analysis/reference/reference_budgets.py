@@ -1,4 +1,4 @@
-"""The contributors to the uncertainty of accelerometers and magnetometers beyond their readings."""
+"""The uncertainty budgets of accelerometers and magnetometers, with the contributors that no readings show."""
 
 from dataclasses import replace
 from decimal import Decimal
@@ -47,9 +47,9 @@ def accelerometer_budget(
 ) -> Budget:
     """Return the budget of an accelerometer's `solution` from a `movement`.
 
-    `lag_s` is the half-width of the sensor's filter lag. `noise_dof` (3 N + 9 M,) are the degrees of freedom of the
-    variances of the dwells' readings, then of the sweeps' harmonics. With a `datasheet` the sensor's own errors are
-    contributors.
+    `lag_s` is the half-width of the unknown lag of the sensor's filter. `noise_dof` (3 N + 9 M,) are the degrees of
+    freedom of the variances of the readings in N dwells, then of the harmonics of M sweeps. The sensor's own errors are
+    contributors only if there is a `datasheet`.
     """
     spread = _propagate(
         solution,
@@ -68,7 +68,10 @@ def accelerometer_budget(
 def combine_errors(
     spread: FitUncertainty, theta: Array, movement: Movement, site: Site, lag_s: float, *, datasheet: Datasheet | None
 ) -> Budget:
-    """Return the budget of scale and bias from the uncertainty `spread` of a fit with the solution `theta` (22,)."""
+    """Return the budget of scale and bias from the uncertainty `spread` of a fit with the solution `theta` (22,).
+
+    Gravity, the filter's lag and, if there is a `datasheet`, the sensor's own errors are separate contributors.
+    """
     others = [_lag(spread, movement, lag_s)] if len(movement.sweeps.speeds_rad_s) else []
     if movement.sensor_errors is None or datasheet is None:
         return reference_budget(spread, _gravity(site), others)
@@ -149,7 +152,10 @@ def _field(site: Site, field_t: float) -> NormUncertainty:
 
 
 def lag_pattern(movement: Movement, lag_s: float) -> Array:
-    """Return the effect (1, 3 K) of the sensor's filter on the readings: (speed × `lag_s`)²/2 of a sweep's wave."""
+    """Return the effect (1, 3 K) of a filter lag of `lag_s` on the readings.
+
+    The filter reduces the wave in a sweep by the fraction (speed × `lag_s`)²/2; dwells and means are unaffected.
+    """
     dwells, sweeps = movement.dwells, movement.sweeps
     smaller = sweeps.harmonics_m_s2 * np.square(sweeps.speeds_rad_s * lag_s)[:, None, None] / 2
     smaller[:, 0] = 0.0  # the mean is not reduced
@@ -157,10 +163,10 @@ def lag_pattern(movement: Movement, lag_s: float) -> Array:
 
 
 def drift_patterns(matrix: Array, attitudes: Array, drift: FieldDrift | None) -> tuple[Array, float]:
-    """Return the patterns (3, 3 N) of a field that changes linearly over the attitudes, and the field's change, T.
+    """Return the patterns (3, 3 N) of a field that changes linearly over the attitudes, and the size of the change, T.
 
-    Each axis of the base has one pattern. If the `drift` was tested, the change is the larger of the change found and
-    its standard deviation, over √3; else it is `UNTESTED_DRIFT_T`.
+    The patterns are those of changes along each axis of the base. If the `drift` was measured, the size is the larger
+    of the measured change and its standard deviation, divided by √3; else it is `UNTESTED_DRIFT_T`.
     """
     change_t = UNTESTED_DRIFT_T
     if drift is not None:

@@ -24,10 +24,10 @@ MIN_SECOND_ORDER_STDS = 3.0  # size of the largest second-order term, in its sta
 
 @dataclass(frozen=True, slots=True)
 class Triad:
-    """Three axes from a solution's matrix F and bias, with the uncertainty of the solution alone.
+    """Three axes from a solution's matrix F (3, 3), with the uncertainty of the solution alone.
 
-    - `scale` (3,): 1/‖row of F‖; `covariance` (6, 6): of scale and bias.
-    - `correction_matrix` M (3, 3): from a reading minus its bias to the orthogonal frame nearest to the axes.
+    - `scale` (3,): one divided by the norm of each row of F; `covariance` (6, 6): that of scale and bias.
+    - `correction_matrix` M (3, 3): takes readings minus bias to the orthogonal frame nearest to the sensor's axes.
     """
 
     scale: Array
@@ -55,7 +55,10 @@ def gravity_reference(site: Site) -> KnownNorm:
 
 
 def field_reference(site: Site, key: str) -> KnownNorm:
-    """Return the field at the site. Raise Fault `field_strength_unknown`, naming the option `key` that states it."""
+    """Return the reference of a magnetometer: the stated size of the field at the site.
+
+    Raise Fault `field_strength_unknown` if it is not stated; the message names the option `key` that states it.
+    """
     if site.magnetic_field_t is None:
         raise Fault(
             "field_strength_unknown",
@@ -67,7 +70,10 @@ def field_reference(site: Site, key: str) -> KnownNorm:
 
 
 def stack_dwells(dwells: Sequence[DwellReading | StaticReading], mounting: Array) -> Dwells:
-    """Return the dwells in the axes of the nominal mounting; mean attitudes are made orthogonal."""
+    """Return the mean readings and attitudes of dwells, in the axes of the nominal `mounting` (3, 3).
+
+    Mean attitudes are replaced by the nearest rotations.
+    """
     return Dwells(
         np.array([dwell.reading.mean for dwell in dwells]),
         np.array([dwell.reading.variance for dwell in dwells]),

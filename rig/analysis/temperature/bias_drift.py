@@ -30,7 +30,7 @@ SLOPE = "over_temperature"
 
 @dataclass(frozen=True, slots=True)
 class ScaleFreeBias:
-    """The bias (3,) of one repeat, with all parameters estimated from this repeat, and the bias' std (3,)."""
+    """The bias (3,) and its std (3,) from a solution of one repeat alone, which estimates scale and axes too."""
 
     bias: Array
     std: Array
@@ -40,16 +40,15 @@ class ScaleFreeBias:
 class BiasDrift:
     """The bias of one quantity of a sensor by repeat, rad/s or m/s².
 
-    A gyroscope's bias includes the Earth's rate times the scale error, or the whole Earth's rate if the site states
-    none (`earth_rate_known`); either part is the same in every repeat.
-
-    - `scale_fixed`: biases with scale, axes and reference as in the first repeat (accelerometer), or with nominal ones
-      (gyroscope).
-    - `common_std` (3,): a further standard deviation common to all biases.
-    - `scale_free`: the bias by a separate solution of every repeat, by the repeat's index.
-    - `time_s`, `temperature_c` (R,): means over every repeat, times since the first repeat.
-    - `dof`, `slope_dof` (3,): degrees of freedom of `scale_fixed.std` and of the slope's standard deviation.
-    - `faults`: under the name SLOPE, why there is no slope.
+    - scale_fixed: biases with scale and axes fixed: those of the first repeat (accelerometer), or nominal (gyroscope).
+    - common_std (3,): the standard deviation of an error that all biases share, in addition to their own.
+    - scale_free: the bias by a separate solution of every repeat, or its Fault, by the repeat's index.
+    - time_s, temperature_c (R,): mean time, since the first of R repeats, and mean temperature of each repeat.
+    - over_temperature: the slope of the bias over temperature, None without one.
+    - earth_rate_known: whether the site states the Earth's rate. If not, a gyroscope's bias contains the whole Earth's
+      rate, otherwise only its product with the scale error; either part is the same in every repeat.
+    - dof, slope_dof (3,): degrees of freedom of `scale_fixed.std` and of the slope's standard deviation.
+    - faults: under the name SLOPE, why there is no slope.
     """
 
     scale_fixed: BiasByRepeat
@@ -69,9 +68,10 @@ Drifts = Mapping[str, Mapping[Quantity, BiasDrift]]
 
 @dataclass(frozen=True, slots=True)
 class DwellMean:
-    """A sensor's means (3,) in one dwell, their variances, the attitude from base to sensor, time and temperature.
+    """A sensor's mean reading (3,) in one dwell, at the middle time `time_s` and a mean temperature.
 
-    `dof` (3,) are the degrees of freedom of the variances.
+    - `variance`, `dof` (3,): the variance of the mean, and the degrees of freedom of this variance.
+    - `attitude` (3, 3): takes vectors from the base's frame into the sensor's.
     """
 
     mean: Array
@@ -83,10 +83,9 @@ class DwellMean:
 
 
 def estimate_bias_drifts(recordings: Sequence[ObservedRun], settings: RunSettings) -> Drifts:
-    """Return the drift of every sensor to calibrate, from the finished repeats in all recordings of a run.
+    """Return the bias drift of every sensor to calibrate, from the finished repeats in all recordings of a run.
 
-    Raise Fault `not_all_attitudes` with fewer than two finished repeats, and what `solve_triaxial` raises for the first
-    repeat.
+    Raise Fault `not_all_attitudes` if fewer than two repeats were finished, and as `fit_acceleration_drift` does.
     """
     site = settings.site
     repeats: defaultdict[int, dict[tuple[float, ...], int]] = defaultdict(dict)
@@ -105,7 +104,10 @@ def estimate_bias_drifts(recordings: Sequence[ObservedRun], settings: RunSetting
 
 
 def _select_complete(means: Mapping[int, DwellMean], table: Sequence[Sequence[int]]) -> list[list[DwellMean]]:
-    """Return the complete repeats; a row of `table` has a repeat's dwell indices. Raise Fault `not_all_attitudes`."""
+    """Return the dwells of each repeat whose dwells were all measured; a row of `table` lists a repeat's dwell indices.
+
+    Raise Fault `not_all_attitudes` if there are too few.
+    """
     complete = [[means[index] for index in repeat] for repeat in table if means.keys() >= set(repeat)]
     if len(complete) < MIN_REPEATS:
         raise Fault(
@@ -134,7 +136,7 @@ def _accelerations(recordings: Sequence[ObservedRun], name: str, sensor: Recorde
 
 
 def _rates(recordings: Sequence[ObservedRun], name: str, sensor: RecordedSensor) -> dict[int, DwellMean]:
-    """Return the gyroscope's mean in every dwell, taken over the rest within the dwell, by the dwell's index."""
+    """Return the gyroscope's mean in every dwell, by the dwell's index; it is that of the rest within the dwell."""
     mounting = np.array(sensor.mounting)
     means = {}
     for recording in recordings:
@@ -154,9 +156,9 @@ def _rates(recordings: Sequence[ObservedRun], name: str, sensor: RecordedSensor)
 
 
 def fit_acceleration_drift(repeats: Sequence[Sequence[DwellMean]], site: Site, *, second_order: bool) -> BiasDrift:
-    """Return the drift of an accelerometer, from repeats of the same attitudes in the same order.
+    """Return the bias drift of an accelerometer, from repeats of the same attitudes in the same order.
 
-    The first repeat determines the fixed parameters. Raise Fault as `solve_triaxial` and `bias_by_repeat` do.
+    Scale and axes are those of the first repeat. Raise Fault as `solve_triaxial` and `bias_by_repeat` do.
     """
     means, variances, attitudes = _stack(repeats)
 
@@ -207,7 +209,10 @@ def _combine(
     *,
     earth_rate_known: bool,
 ) -> BiasDrift:
-    """Return the drift: biases with the scale fixed, biases by a separate `solve` of each repeat, temperature slope."""
+    """Return the drift from biases with a fixed scale (`by_repeat`), which determine the slope over temperature.
+
+    Biases by a separate solution of each repeat, by `solve`, are added.
+    """
     times = np.array([np.mean([mean.time_s for mean in repeat]) for repeat in repeats], dtype=np.float64)
     temperatures = np.array([np.mean([mean.temperature_c for mean in repeat]) for repeat in repeats], dtype=np.float64)
     faults = dict[str, Fault]()
@@ -228,7 +233,7 @@ def _combine(
 
 
 def _repeat_dof(repeat: Sequence[DwellMean]) -> Array:
-    """Return the degrees of freedom (3,) of a repeat's mean over its attitudes."""
+    """Return the degrees of freedom (3,) of the variance of a repeat's mean over all its dwells."""
     return effective_dof([mean.variance for mean in repeat], dof_by_axis(mean.dof for mean in repeat))
 
 

@@ -50,8 +50,9 @@ class CorrectedRuns:
 
 
 def correct_recordings(recordings: Sequence[ObservedRun], settings: RunSettings, reference_c: float) -> CorrectedRuns:
-    """Return the recordings with rates and dwells' accelerations as at `reference_c`, for the sensors to calibrate.
+    """Return the recordings with the means of sensors to calibrate corrected to the temperature `reference_c`.
 
+    The means are those of gyroscopes in sweeps and rests, and of accelerometers in dwells and sweeps.
     Raise Fault `temperature_not_recorded`, and what `fit_over_temperature` raises.
     """
     environment = find_environment(recordings, settings)
@@ -68,7 +69,7 @@ def correct_recordings(recordings: Sequence[ObservedRun], settings: RunSettings,
 
 
 def correct_files(data: ExternalData, reference_c: float) -> tuple[ExternalData, OverTemperature]:
-    """Return sweeps and rests of files, with means as at `reference_c`, and the polynomials that corrected them.
+    """Return sweeps and rests of files, with means corrected to `reference_c`, and the polynomials of the correction.
 
     Raise Fault as `correct_recordings` does.
     """
@@ -91,7 +92,7 @@ def correct_files(data: ExternalData, reference_c: float) -> tuple[ExternalData,
 
 
 def add_rate_polynomials(result: SensorResult, polynomials: OverTemperature) -> tuple[SensorResult, OverTemperature]:
-    """Return a gyroscope's calibration and polynomials, both with the combined uncertainty of the two."""
+    """Return a gyroscope's calibration and polynomials; the uncertainty of each now includes that of the other."""
     parameters = np.r_[result.scale, result.bias_rad_s]
     if result.uncertainty is None:
         return result, combine_with_reference(polynomials, np.diag(RATE.parameter_signs) @ parameters, ())
@@ -102,7 +103,7 @@ def add_rate_polynomials(result: SensorResult, polynomials: OverTemperature) -> 
 def add_acceleration_polynomials(
     result: AccelerometerResult, polynomials: OverTemperature
 ) -> tuple[AccelerometerResult, OverTemperature]:
-    """Return an accelerometer's calibration and polynomials, both with the combined uncertainty of the two."""
+    """Return an accelerometer's calibration and polynomials; the uncertainty of each now includes that of the other."""
     budget, combined = _combine(ACCELERATION, polynomials, np.r_[result.triad.scale, result.bias_m_s2], result.budget)
     return replace(result, budget=budget), combined
 
@@ -110,7 +111,10 @@ def add_acceleration_polynomials(
 def _combine(
     quantity: Quantity, polynomials: OverTemperature, parameters: Array, budget: Budget
 ) -> tuple[Budget, OverTemperature]:
-    """Return the budget, to which the polynomials' fit is added, and the polynomials with the budget's contributors."""
+    """Return the budget with the fit of the polynomials as a contributor, and the polynomials with all contributors.
+
+    `parameters` (6,) are scale and bias at the reference temperature.
+    """
     sign = np.diag(quantity.parameter_signs)
     values = sign @ parameters
     lines = tuple(
