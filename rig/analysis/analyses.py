@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 def calibrate(runs: "Sequence[RunData]", estimator: str = DEFAULT_ESTIMATOR, *, drifting: bool = False) -> Outcome:
     """Return the outcome of a calibration, whose recordings are solved and judged.
 
-    `runs`: at least one recording, of a run or from files. If `drifting`, a bias drift does not count as a
-    contradiction. Raise Fault or Refused if the recordings lack something.
+    `runs`: at least one recording, of a run or from files. If `drifting`, a bias drift of an accelerometer or
+    magnetometer does not count as a contradiction. Raise Fault or Refused if the recordings do not suffice.
     """
     if (external := runs[0].external) is not None:
         from rig.analysis.external import external_outcome as external_judging
@@ -33,7 +33,7 @@ def calibrate(runs: "Sequence[RunData]", estimator: str = DEFAULT_ESTIMATOR, *, 
 
 @solvable()
 def estimate_bias_drift(runs: "Sequence[RunData]", estimator: str = DEFAULT_ESTIMATOR) -> Outcome:
-    """Return the outcome of `calibrate` with the bias in each repeat of the same attitudes.
+    """Return the outcome of `calibrate`, to which the bias in each repeat of the attitudes is added.
 
     Raise Fault as `calibrate` and `estimate_bias_drifts` do.
     """
@@ -44,7 +44,7 @@ def estimate_bias_drift(runs: "Sequence[RunData]", estimator: str = DEFAULT_ESTI
 
 @solvable()
 def calibrate_by_hand(runs: "Sequence[RunData]") -> Outcome:
-    """Return the outcome of a session by hand, whose recordings, at least one, are solved and judged.
+    """Return the outcome of a session by hand, whose recordings (at least one) are solved and judged.
 
     Raise Fault and Refused as `rig.estimation.by_hand.solution.solve_by_hand` and `collect_inputs` do.
     """
@@ -55,9 +55,10 @@ def calibrate_by_hand(runs: "Sequence[RunData]") -> Outcome:
 
 @solvable()
 def verify_calibration(outcome: Outcome, repeated: "Sequence[RunData]") -> Outcome:
-    """Return the outcome with a verification by `repeated`, recordings of the same movement with calibrated readings.
+    """Return the outcome of a calibration, to which a verification by the recordings `repeated` is added.
 
-    Without such a recording the checks of the verification fail. Raise Fault as `observe_runs` and `verify` do.
+    These contain the same movement, with readings that the board has calibrated. If there are none, the checks of the
+    verification fail. Raise Fault as `observe_runs` and `verify` do.
     """
     from rig.analysis import judging
 

@@ -17,10 +17,10 @@ UNCALIBRATED_FAULTS = ("no_attitudes", "field_strength_unknown")  # of sensors t
 class Check:
     """One check of the verdict, which passes if its value is a number not above limit - guard.
 
-    - name: the check in words, for people; programs use `means` instead.
+    - name: the check's name for people, as in "gyro.bias"; programs use `means` instead.
     - value, limit: the measured value and its limit, in `unit`; None if nothing was measured, or no limit was set.
     - unit: the unit of value, limit, uncertainty and guard.
-    - means: the sensor and quantity that the check is about.
+    - means: the criterion, sensor and quantity that the check is about.
     - uncertainty: U of the value, None without one.
     - guard: the distance from the limit that the decision rule requires: U for the guard band (ILAC-G8, 4.2), else 0.
     - coverage_factor: k of U.
@@ -46,7 +46,10 @@ class Check:
 
     @property
     def false_acceptance(self) -> float | None:
-        """The probability that the true value of a passed check is beyond the limit; None if the check failed."""
+        """The probability that the true value of a passed check is beyond the limit.
+
+        None if the check failed, or if its value has no uncertainty.
+        """
         if self.value is None or self.limit is None or not self.uncertainty or not self.passed:
             return None
         return float(tail_probability((self.limit - self.value) * self.coverage_factor / self.uncertainty, self.dof))
@@ -74,9 +77,9 @@ def fitness(
 
 
 def list_unsolved(faults: Iterable[tuple[str, str, Fault]]) -> Iterator[Check]:
-    """Yield a failing check for each sensor without a solution, from name, quantity and Fault.
+    """Yield a failing check for each of `faults`: the sensor's name, the quantity, and why there is no solution.
 
-    A sensor that is only recorded, such as a magnetometer in sweeps, gets no check.
+    If the Fault is that the sensor is only recorded, such as a magnetometer in sweeps, there is no check.
     """
     for sensor, quantity, fault in faults:
         if fault.name not in UNCALIBRATED_FAULTS:

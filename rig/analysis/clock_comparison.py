@@ -1,7 +1,7 @@
 """The controller's clock, compared with this computer's clock and the board's crystal.
 
-A speed is 2π over a time of the controller's clock, so every scale factor has that clock's error. No clock is left out.
-The difference of each pair of clocks is compared with the stated errors of both.
+A speed is 2π over a time of the controller's clock, so every scale factor has that clock's error. Clocks that disagree
+are not left out of the estimate of this error. The difference of each pair is checked against both stated errors.
 """
 
 from collections.abc import Iterable, Iterator
@@ -27,10 +27,10 @@ CLOCK_NAMES = {COMPUTER_CLOCK: "computer", CRYSTAL_CLOCK: "crystal"}
 
 @dataclass(frozen=True, slots=True)
 class ClockComparison:
-    """The relative error of the controller's clock according to another clock, and its standard uncertainty.
+    """The relative `error` of the controller's clock according to the clock called `by`.
 
-    `half_width`: the half-width of the other clock's stated error. `noise_std`: the uncertainty from the recording's
-    noise, with `dof` degrees of freedom.
+    - `half_width`: the half-width of the stated error of the clock `by`.
+    - `noise_std`: the standard uncertainty of `error` due to noise, with `dof` degrees of freedom.
     """
 
     by: str
@@ -47,7 +47,7 @@ class ClockComparison:
 
 @dataclass(frozen=True, slots=True)
 class ClockDifference:
-    """The relative difference of two clocks, by name, and its limit from stated and measured errors."""
+    """The relative difference (`size`) of two clocks, by their names, and its limit from stated errors and noise."""
 
     clocks: tuple[str, str]
     size: float
@@ -55,7 +55,7 @@ class ClockDifference:
 
     @property
     def limit_fraction(self) -> float:
-        """The difference over its limit; above one the clocks contradict each other."""
+        """The difference divided by its limit; if it is above one, the clocks contradict each other."""
         return self.size / self.limit
 
 
@@ -93,7 +93,7 @@ class ClockCheck:
 
 
 def check_clock(recording: ObservedRun, uncertainty: Uncertainty) -> ClockCheck:
-    """Return the error of the controller's clock in one recording, relative to every other clock."""
+    """Return the error of the controller's clock in one recording, from its comparison with every other clock."""
     # Imported here: it takes a tenth of the time of a plan's imports.
     from rig.data.recording.provenance import calls_itself_simulated
 
@@ -109,7 +109,7 @@ def check_clock(recording: ObservedRun, uncertainty: Uncertainty) -> ClockCheck:
 
 
 def worst_differences(clocks: Iterable[ClockCheck]) -> list[ClockDifference]:
-    """Return the largest difference of each pair of clocks among all recordings."""
+    """Return for each pair of clocks the difference that is largest relative to its limit, over all recordings."""
     worst: dict[tuple[str, str], ClockDifference] = {}
     for one in (difference for check in clocks for difference in check.differences()):
         worst[one.clocks] = max(worst.get(one.clocks, one), one, key=lambda difference: difference.limit_fraction)

@@ -1,4 +1,4 @@
-"""The degrees of freedom of estimates without a budget of their own: angles, sensitivity to gravity.
+"""The degrees of freedom of estimates without a budget of their own, such as angles and sensitivity to gravity.
 
 The estimates' variance is divided among the budget's contributors of type A, each with its degrees of freedom (Welch
 and Satterthwaite, JCGM 100, G.4); the remainder, due to arm errors of a stated size, has infinite degrees of freedom.
@@ -23,7 +23,10 @@ if TYPE_CHECKING:
 
 
 def angle_dof(result: "SensorResult") -> Array | None:
-    """Return the degrees of freedom (6,) of a gyroscope's non-orthogonality, then its mounting; None if unknown."""
+    """Return the degrees of freedom (6,) of a gyroscope's three angles of non-orthogonality, then of its mounting.
+
+    Return None without a vector solution or a budget.
+    """
     explained, budget = result.explained, result.uncertainty
     if explained is None or budget is None:
         return None
@@ -72,9 +75,9 @@ def field_angle_dof(result: "MagnetometerResult") -> Array:
 
 
 def reversal_dof(reversal: "MagnetometerReversal") -> tuple[Array, Array]:
-    """Return the degrees of freedom of the mean scale factors (3,), and of bias and arm's field (6,).
+    """Return the degrees of freedom of the mean scale factors (3,), and those of bias and arm's field (6,).
 
-    For bias and field, this is the smallest number of any run's bias, because a sum of independent parts has no fewer.
+    All of the latter are the smallest of any run's bias, because a sum of independent parts has no fewer.
     """
     budgets = [run.result.budget for run in reversal.runs]
     # Welch–Satterthwaite: u⁴ / ν = Σ u_i⁴ / ν_i. Errors common to the runs have infinite ν and add nothing.
@@ -85,7 +88,7 @@ def reversal_dof(reversal: "MagnetometerReversal") -> tuple[Array, Array]:
 
 
 def _axis_dof(result: "AccelerometerResult | MagnetometerResult", response: Array, noise: Array) -> Array:
-    """Return the degrees of freedom of the angles between axes, for readings with `noise` (n, n).
+    """Return the degrees of freedom (3,) of the angles between axes, for readings with the covariance `noise` (n, n).
 
     `response` (p, n): the derivatives of all parameters with respect to the readings.
     """
@@ -96,10 +99,10 @@ def _axis_dof(result: "AccelerometerResult | MagnetometerResult", response: Arra
 
 
 def _attitude_dof(budget: Budget, response: Array, noise: Array, std: Array) -> Array:
-    """Return the degrees of freedom of the standard deviations `std` (q,) of q angles.
+    """Return the degrees of freedom (q,) of the standard deviations `std` (q,) of q estimates.
 
-    `response` (q, n) is the derivative of the angles by the readings, whose covariance is `noise` (n, n). The part of
-    the variance that is not due to noise has the degrees of freedom of the attitudes in the `budget`.
+    `response` (q, n) are the derivatives of the estimates with respect to the readings, whose covariance is `noise`
+    (n, n). The part of a variance that is not due to noise has the degrees of freedom of the attitudes in the `budget`.
     """
     from rig.estimation.reference.reference_budget import ATTITUDES
 
@@ -108,17 +111,17 @@ def _attitude_dof(budget: Budget, response: Array, noise: Array, std: Array) -> 
 
 
 def _reading_parts(noise: Array, walk: Array, explained: VectorFit) -> dict[str, Array]:
-    """Return the parts of a gyroscope's variances due to readings, by contributor: `noise` and the bias's `walk`.
+    """Return the variances that have finite dof, by contributor: those due to `noise` and to the bias's `walk`.
 
-    Without drift in the readings `walk` is omitted, because the data sheet's flicker has infinite dof.
+    If readings show no bias drift, `walk` is omitted, because it is the data sheet's flicker, which has infinite dof.
     """
     return {NOISE: noise, **({BIAS_DRIFT: walk} if explained.bias.is_drifting else {})}
 
 
 def _split(whole: Array, parts: dict[str, Array], budget: Budget) -> Array:
-    """Return the degrees of freedom (…) of variances `whole` (…), by Welch–Satterthwaite.
+    """Return the degrees of freedom of the variances `whole`, of the same shape, by Welch–Satterthwaite.
 
-    Each of `parts` (…) has the degrees of freedom of the budget's contributor of its name, and the remainder of `whole`
+    Each of `parts` has the degrees of freedom of the budget's contributor with the same name; the remainder of `whole`
     has infinitely many. Raise KeyError if the budget has no such contributor.
     """
     clipped = [np.clip(part, 0.0, whole) for part in parts.values()]
@@ -134,7 +137,10 @@ def _angle_derivatives(matrix: Array) -> Array:
 
 
 def _drift_covariance(explained: VectorFit) -> Array:
-    """Return the bias drift's part (3, p, p) in the covariance of each axis' p coefficients of the vector model."""
+    """Return for each axis the part of the covariance of the vector model's p coefficients that is due to bias drift.
+
+    The shape is (3, p, p).
+    """
     inputs = explained.inputs
     gravity = None if explained.solution.g_sensitivity is None else inputs.apparent_gravity_m_s2
     design = design_matrix(inputs.rates_rad_s, gravity)

@@ -16,12 +16,14 @@ SPLINE_NOISE_RATIO = 0.935  # the same for an angle between two readings, by the
 
 @dataclass(frozen=True, slots=True)
 class MeasurementEnvironment:
-    """The site, the stated uncertainty, the controller's clock, and the jitter of the times of its states, s.
+    """The site, the stated uncertainties, and what the recordings show of clocks and states.
 
-    - `clock`: the comparison that corrects the speeds; `clocks`: the comparisons of all recordings, for the checks.
-    - `extension_m` (3,): the sensors' position relative to the flange, in the flange's frame.
-    - `reading_noise_rad`: noise of a joint's angle at any time, from the noise of its encoder.
-    - `finds_earth_rate`: whether the Earth's rate is estimated, not taken from the site.
+    - clock: the comparison of clocks that corrects the speeds.
+    - state_jitter_s: standard deviation of the times of the arm's states, with `state_jitter_dof` degrees of freedom.
+    - extension_m (3,): the sensors' position relative to the flange, in the flange's frame.
+    - finds_earth_rate: whether the Earth's rate is estimated, not taken from the site.
+    - clocks: the comparisons in all recordings, for the checks.
+    - reading_noise_rad: noise of a joint's angle at any time, due to the noise of its encoder.
     """
 
     site: Site
@@ -36,10 +38,10 @@ class MeasurementEnvironment:
 
 
 def find_environment(recordings: Sequence[ObservedRun], settings: RunSettings) -> MeasurementEnvironment:
-    """Return the site and the clock comparison of a run.
+    """Return the environment of a run, from all its recordings and its settings.
 
-    The recording with the longest motion determines the clock, since all recordings share the controller's quartz. The
-    comparisons of all recordings are returned too, because they differ if the quartz or the computer's time was
+    The recording with the longest motion determines the clock, because all recordings share the controller's quartz.
+    The comparisons of all recordings are included for the checks: they differ if the quartz or the computer's time was
     changed.
     """
     uncertainty = settings.stated_uncertainty

@@ -25,7 +25,7 @@ class OfKind:
 
 @dataclass(frozen=True, slots=True)
 class KindFound:
-    """The solution of one sensor of an installed kind; if it is None, `fault` says why."""
+    """The result for one sensor of an installed kind: `solved`, or if that is None, the `fault` that says why."""
 
     name: str
     sensor: RecordedSensor | Item
@@ -40,7 +40,7 @@ class KindFound:
 
 
 def kinds_on_arm(recordings: Sequence[ObservedRun], settings: RunSettings) -> Iterator[KindFound]:
-    """Yield the solution of every recorded sensor of an installed kind, in the order of the kinds."""
+    """Yield the solution or the Fault of every recorded sensor of an installed kind, in the order of the kinds."""
     for kind in installed_kinds():
         faults = dict[str, Fault]()
         for name, sensor in recordings[0].run.measuring(kind.quantity).items():

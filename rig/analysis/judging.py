@@ -106,7 +106,7 @@ def _check_unsolved(dwells: "_DwellOutcome", installed_kinds: Sequence[KindFound
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _GyroscopeOutcome:
-    """The gyroscopes' part of an outcome, from sweeps; empty if no sweep was planned."""
+    """The part of an outcome that is about gyroscopes, from sweeps; empty if no sweep was planned."""
 
     polynomials: "Polynomials"
     results: Mapping[str, SensorResult] = field(default_factory=dict)
@@ -123,7 +123,10 @@ def _judge_gyroscopes(
     estimator: Estimator,
     polynomials: "Polynomials",
 ) -> _GyroscopeOutcome:
-    """Return the gyroscopes' part of an outcome: calibration, the board's arithmetic, contradictions and clocks."""
+    """Return the part of an outcome that is about gyroscopes.
+
+    It contains their calibrations, and checks of limits, of the board's arithmetic, of contradictions, and of clocks.
+    """
     environment = find_environment(recordings, settings)
     results = solve_observed(runs[0].measuring(RATE), recordings, environment, estimator, settings.matrix_corrected)
     if polynomials:
@@ -155,7 +158,7 @@ def _judge_gyroscopes(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _DwellOutcome:
-    """The part of an outcome from attitudes at rest; empty if no attitude was planned."""
+    """The part of an outcome that is about accelerometers and magnetometers; empty if no attitude was planned."""
 
     polynomials: "Polynomials"
     accelerometers: "Attempts[str, AccelerometerResult]" = field(default_factory=Attempts)
@@ -166,10 +169,9 @@ class _DwellOutcome:
 def _judge_dwells(
     recordings: tuple[ObservedRun, ...], settings: RunSettings, swept: _GyroscopeOutcome, *, drifting: bool
 ) -> _DwellOutcome:
-    """Return the part of an outcome from dwells, of accelerometers and magnetometers; gyroscopes are solved already.
+    """Return the part of an outcome that is about accelerometers and magnetometers.
 
-    An accelerometer without a solution does not affect the other sensors. Raise its Fault if there are no others, if
-    not all attitudes were recorded, or in a calibration over temperature or time.
+    `swept` contains the gyroscopes' results, to which accelerometers are aligned.
     """
     from rig.analysis.reference.accelerometer import calibrate_accelerometers
     from rig.analysis.reference.magnetometer import calibrate_magnetometers
@@ -201,7 +203,10 @@ def _add_polynomials(
     add: Callable[[ResultT, "OverTemperature"], tuple[ResultT, "OverTemperature"]],
     polynomials: "Polynomials",
 ) -> tuple[dict[str, ResultT], "Polynomials"]:
-    """Return a quantity's results and its polynomials, both with the combined uncertainty of the two."""
+    """Return the results of a quantity, and all polynomials, after `add` has combined the uncertainty of both.
+
+    `add` takes and returns one sensor's result and the polynomials of this quantity.
+    """
     settled = {name: add(results[name], fits[quantity]) for name, fits in polynomials.items() if quantity in fits}
     added = {name: result for name, (result, _) in settled.items()}
     combined = {name: {**polynomials[name], quantity: fit} for name, (_, fit) in settled.items()}
@@ -264,9 +269,10 @@ def _gravity_effects(
     after: Sequence[ObservedRun],
     settings: RunSettings,
 ) -> tuple[Array, Array] | None:
-    """Return gravity's effects (N, 3) that the corrected readings of sensor and of reference contain.
+    """Return gravity's effects on the corrected readings of sensor and of reference in N revolutions, (N, 3) each.
 
-    The centripetal acceleration acts like gravity. Return None if the calibration has no g-sensitivity.
+    `pair` is the name of the sensor, and the reference. The centripetal acceleration acts like gravity. Return None if
+    g-sensitivities were not estimated for both.
     """
     from rig.analysis.gyroscope.comparison import list_revolutions
 

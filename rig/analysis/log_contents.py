@@ -28,14 +28,18 @@ from rig.sensors.lines.log_columns import LogColumns, guess_columns
 
 @dataclass(frozen=True, slots=True)
 class LookedFile:
-    """The contents of a file.
+    """The contents of a file of another program.
 
-    - layout: the layout of a table; guess: the probable content of its columns; None for other files.
-    - columns: the map of its columns, in the form of `--columns`, incomplete if it contains "?".
-    - samples, survey: its readings, if any can be read; others: number of rows without readings; note: what the
-      readings lack.
-    - origin_s: origin of the readings' times; the attitudes' times are on their own clock.
-    - attitudes: the reports of a reference, if the file has one; omitted_attitudes: number of rows without a valid one.
+    - layout: how numbers and headings are arranged, if the file is a table whose columns are guessed; else None.
+    - guess: the probable content of each column of such a table; else None.
+    - columns: the map of the columns, in the form of `--columns`; it is incomplete if it contains "?".
+    - samples: the readings, None if they cannot be read.
+    - survey: a summary of the readings.
+    - others: the number of rows without readings.
+    - note: a sentence on what the readings lack.
+    - origin_s: the time on the file's clock from which the times of the readings count.
+    - attitudes: the reports of a reference, with times on their own clock; None if there are none.
+    - omitted_attitudes: the rows left out because they contain no valid attitude.
     - refusals: why readings or attitudes could not be read.
     """
 
@@ -59,12 +63,12 @@ class LookedFile:
 
     @property
     def has_readings(self) -> bool:
-        """True if the file has readings, even if they could not be read yet."""
+        """Whether the file has readings, even if they could not be read yet."""
         return self.samples is not None or "samples" in self.columns
 
 
 def look_at(path: Path, stated: ColumnMap | None = None) -> LookedFile:
-    """Return the contents of a file, according to its headings and numbers or to a `stated` map of its columns.
+    """Return the contents of a file, whose columns are those in the map `stated`, or are guessed if it is None.
 
     Raise Refused `bad_option` for a file of sweeps, and what `find_layout` raises for a file that is not a table.
     """
@@ -89,14 +93,20 @@ def look_at(path: Path, stated: ColumnMap | None = None) -> LookedFile:
 
 
 def find_pair(looks: Sequence[LookedFile]) -> tuple[LookedFile | None, LookedFile | None]:
-    """Return the file with readings and the file with attitudes, None if missing; both count times from one origin."""
+    """Return the file with readings and the file with attitudes, each None if missing.
+
+    If both exist, the times of the attitudes count from the same origin as those of the readings.
+    """
     log = next((looked for looked in looks if looked.samples is not None), None)
     reference = _find_reference(looks)
     return log, reference if log is None or reference is None else _count_from(reference, log.origin_s)
 
 
 def join_maps(looks: Sequence[LookedFile]) -> dict[str, Any]:
-    """Return the map of all files' columns; a log's own attitudes are left out if another file has the attitudes."""
+    """Return one map of the columns of all files.
+
+    Attitudes in the file with the readings are left out if another file has attitudes without readings.
+    """
     reference = _find_reference(looks)
     columns: dict[str, Any] = {}
     for looked in reversed(looks):  # if there are two files, the first has the readings
@@ -112,7 +122,7 @@ def _find_reference(looks: Sequence[LookedFile]) -> LookedFile | None:
 
 
 def _count_from(looked: LookedFile, origin_s: int) -> LookedFile:
-    """Return a reference's file with the attitudes' times counted from `origin_s`, the origin of a log's times."""
+    """Return a reference's file with the attitudes' times counted from `origin_s`, as those of a log's readings are."""
     if looked.attitudes is None or not origin_s:
         return looked
     times = {name: looked.attitudes[name] - origin_s for name in ("start_s", "end_s")}
@@ -146,7 +156,10 @@ def is_incomplete(columns: Mapping[str, Any]) -> bool:
 
 
 def _read_numbers(path: Path, layout: TableLayout) -> tuple[Array, Array | None]:
-    """Return all numbers (n, k) of a table, NaN if missing, and the times (n,) in their column's unit, or None."""
+    """Return all numbers (n, k) of a table, NaN if missing, and the times (n,) in the unit of their column.
+
+    The times are None if the table has no column of times.
+    """
     unit_s = 1.0 if layout.time_unit is None else UNITS[layout.time_unit].size
     # A workspace of MATLAB has columns of other tables too: there a column's number is not that in the layout.
     names = layout.headings if is_mat(path) else [str(index + 1) for index in range(len(layout.headings))]
@@ -163,7 +176,7 @@ def _read_numbers(path: Path, layout: TableLayout) -> tuple[Array, Array | None]
 
 
 def _map_of(layout: TableLayout, guess: LogColumns) -> dict[str, Any]:
-    """Return the map of a table's columns, without columns that have the rig's names and units."""
+    """Return the map of a table's columns, as guessed; columns with the rig's own names and units need no entry."""
     columns: dict[str, Any] = {}
     sections = {"samples": guess.samples, "motion": guess.motion}
     for section, entries in sections.items():
@@ -187,7 +200,10 @@ def _map_of(layout: TableLayout, guess: LogColumns) -> dict[str, Any]:
 
 
 def _read_contents(looked: LookedFile, column_map: ColumnMap, *, has_readings: bool, has_attitudes: bool) -> LookedFile:
-    """Return `looked` with its readings and attitudes, or with the reasons why these cannot be read as `refusals`."""
+    """Return `looked` with the readings and attitudes of its file; `refusals` are the reasons why any cannot be read.
+
+    `has_readings` and `has_attitudes`: whether to read them.
+    """
     refusals: list[RigError] = []
     if has_readings:
         try:
@@ -207,7 +223,7 @@ def _read_contents(looked: LookedFile, column_map: ColumnMap, *, has_readings: b
 
 
 def _read_samples(looked: LookedFile, column_map: ColumnMap) -> LookedFile:
-    """Return the file with its readings; if sensors' rows differ, only with the gyroscope's rows."""
+    """Return the file with its readings; if sensors have different rows, only with those of the gyroscope."""
     mapped = map_samples(column_map)
     try:
         table = read_sample_table(looked.path, (), mapped)

@@ -20,7 +20,7 @@ from rig.observation.external.from_files import Files, build_recording
 
 
 def find_allan_obstacle(samples: Samples) -> RigError | None:
-    """Return the reason why a log does not show a sensor at rest, or None."""
+    """Return the error that says why a log does not show a sensor at rest; None if it does."""
     try:
         for quantity, readings in samples.readings.items():
             check_at_rest(samples.time_s, readings, quantity)
@@ -31,14 +31,17 @@ def find_allan_obstacle(samples: Samples) -> RigError | None:
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """An attempt at a solution, for the sensors `only` (all if empty); `obstacle`: why it failed, or None."""
+    """An attempt at a solution of the sensors named in `only`, or of all if it is empty.
+
+    `obstacle` says why the attempt failed; None if it did not.
+    """
 
     only: tuple[str, ...] = ()
     obstacle: str | None = None
 
 
 def try_turns(path: Path, column_map: ColumnMap) -> Trial:
-    """Return an attempt to solve a log as one of a sensor turned by hand (`--turns`)."""
+    """Return an attempt to solve a log as that of a sensor turned by hand (`--turns`)."""
     options = {
         "clock_ppm": 50.0,
         "box_rad": float(np.radians(0.2)),
@@ -53,7 +56,10 @@ def try_turns(path: Path, column_map: ColumnMap) -> Trial:
 def try_attitudes(
     path: Path, reference: Path, column_map: ColumnMap, up: str, *, find_clock: bool, sensors: Sequence[str]
 ) -> Trial:
-    """Return an attempt to solve all sensors of a log in the attitudes of a reference, or else the gyroscope alone."""
+    """Return an attempt to solve a log in the attitudes of a reference.
+
+    If not all `sensors` have a solution, the gyroscope alone is tried.
+    """
     files = Files(path, reference, "attitudes", Item("imu"), None, column_map)
     trial = Trial()
     for only in ((), (RATE.sensor,)) if len(sensors) > 1 and RATE.sensor in sensors else ((),):
@@ -65,7 +71,10 @@ def try_attitudes(
 
 
 def _find_obstacle(files: Files, request: SolveOptions, up: str) -> str | None:
-    """Return the reason why the files have no solution with `up` upwards, or the checks that fail; None if all pass."""
+    """Return why the files have no solution, or which checks fail; None if all pass.
+
+    `up` is the axis of the reference's room that points upwards.
+    """
     x, y, z = axis_of(up).tolist()
     site = Site(up=(x, y, z), gravity_m_s2=STANDARD_GRAVITY_M_S2, earth_rate_rad_s=None)
     try:

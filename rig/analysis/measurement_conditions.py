@@ -39,7 +39,7 @@ class GyroscopeConditions:
 
 @dataclass(frozen=True, slots=True)
 class _WeightedReadings:
-    """Readings from start to end on the first recording's clock, with weight and temperature (NaN if unknown)."""
+    """One average of readings: start and end on the first recording's clock, weight, temperature (NaN if unknown)."""
 
     start_s: float
     end_s: float
@@ -48,7 +48,7 @@ class _WeightedReadings:
 
 
 def gyroscope_conditions(recordings: Sequence[ObservedRun], name: str) -> GyroscopeConditions:
-    """Return the conditions of a gyroscope's readings: for the scale in sweeps, for the bias in sweeps and rests."""
+    """Return the conditions of a gyroscope's readings: in sweeps for the scale, in sweeps and rests for the bias."""
     parts = [(recording.sensors[name], recording.clock_offset_s) for recording in recordings]
     turns = [_read_average(turn.average, offset_s) for part, offset_s in parts for turn in part.revolutions]
     rests = [_read_average(rest, offset_s) for part, offset_s in parts for rest in part.rests]
@@ -58,7 +58,7 @@ def gyroscope_conditions(recordings: Sequence[ObservedRun], name: str) -> Gyrosc
 
 
 def accelerometer_conditions(recordings: Sequence[ObservedRun], name: str, dwells: Iterable[int]) -> Conditions:
-    """Return the conditions of an accelerometer's readings: in the dwells with these indices, and in sweeps."""
+    """Return the conditions of an accelerometer's readings in sweeps, and in the dwells with the indices `dwells`."""
     wanted = frozenset(dwells)
     read = []
     for recording in recordings:
@@ -78,7 +78,7 @@ def accelerometer_conditions(recordings: Sequence[ObservedRun], name: str, dwell
 
 
 def magnetometer_conditions(recordings: Sequence[ObservedRun], name: str, dwells: Iterable[int]) -> Conditions:
-    """Return the conditions of a magnetometer's readings, without temperature, in the dwells with these indices.
+    """Return the conditions, without temperature, of a magnetometer's readings in the dwells with the indices `dwells`.
 
     If a dwell was repeated, only its last execution is used.
     """
@@ -100,7 +100,7 @@ def _read_average(average: Average, offset_s: float) -> _WeightedReadings:
 
 
 def _average_conditions(recordings: Sequence[ObservedRun], name: str, read: Sequence[_WeightedReadings]) -> Conditions:
-    """Return the conditions of weighted windows; a recording's clock starts with its first state."""
+    """Return the conditions of weighted averages, as UTC; the first recording started at its first state."""
     began = datetime.fromisoformat(recordings[0].run.provenance.started_utc)
     first_s, weights = float(recordings[0].motion.time_s[0]), [window.weight for window in read]
 

@@ -10,7 +10,10 @@ LIBRARIES = ("numpy.", "scipy.")
 
 @contextmanager
 def solvable() -> Iterator[None]:
-    """Raise Fault `not_solvable` if NumPy or SciPy raises ValueError in the block; errors of our own code pass."""
+    """Raise Fault `not_solvable` instead of a ValueError that NumPy or SciPy raises in the block.
+
+    A ValueError that the project's own code raises is not replaced.
+    """
     try:
         yield
     except ValueError as error:  # includes NumPy's LinAlgError

@@ -32,7 +32,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """The equipment and times of the measurements; `recorded` has those of the run's first recording."""
+    """The equipment and times of the measurements.
+
+    - `recorded`: those of the run's first recording.
+    - `stored_calibrations`: the calibrations that the board had stored in the last recording, by sensor.
+    - `resumed_utc`, `verified_utc`: when the run was resumed, and when its verifications began.
+    """
 
     recorded: "Provenance"
     stored_calibrations: "Mapping[str, StoredCalibrationEntry]"
@@ -61,23 +66,23 @@ def origin_of(runs: "Sequence[RunData]") -> Origin:
 class Outcome:
     """The results of a run's recordings, by sensor name.
 
-    - settings, provenance: of the recordings.
-    - recordings: of the calibration, with a finished sweep; empty if stored calibrations were verified.
+    - settings: the settings of the run.
+    - provenance: the equipment and times of the measurements.
+    - recordings: the observed recordings of the calibration; empty if stored calibrations were verified.
     - checks: the checks of the verdict.
     - results: the calibrations of gyroscopes; empty if stored calibrations were verified.
     - onboard: the board's own calibrations, compared with the host's; empty if stored ones were verified.
-    - verifications: of the sensors that could be verified.
-    - clock: comparison of the controller's clock, None if its uncertainty is not stated.
+    - verifications: the verifications of those sensors that could be verified.
+    - clock: comparison of the controller's clock with other clocks, None if no sweeps were solved.
     - accelerometers: the calibrations of accelerometers.
-    - accelerometer_faults: why others have none.
-    - magnetometers: the calibrations of magnetometers, without limits of scale and bias.
-    - drifts: biases by repeat, if attitudes were repeated.
-    - detection_limits: of the gyroscopes' checks.
-    - reference_detection_limits: of the checks of accelerometers and magnetometers.
+    - magnetometers: the calibrations of magnetometers, whose scale and bias are not checked against limits.
+    - drifts: biases by repeat, if attitudes were repeated to show bias drift.
+    - detection_limits: the detection limits of the gyroscopes' checks.
+    - reference_detection_limits: the detection limits of the checks of accelerometers and magnetometers.
     - external: the results of external recordings; their gyroscopes are in results too.
     - installed_kinds: the results of the solvers of installed kinds.
     - mounts: the item's mount in each stage after the first.
-    - polynomials: a calibration over temperature; all other results then refer to the reference temperature.
+    - polynomials: those of a calibration over temperature; all other results then refer to the reference temperature.
     """
 
     settings: "RunSettings"

@@ -31,10 +31,11 @@ NO_SWEEP_YET = Fault("too_few_observations", "no sweep is averaged yet", "Wait f
 
 @dataclass(frozen=True, slots=True)
 class PartialGyroscope:
-    """A gyroscope's partial result: its finished sweeps by index, observed or refused.
+    """A gyroscope's partial result.
 
-    The `solution` of the vector model is None while data are insufficient, as the fault `missing` explains.
-    `bias_rad_s`: the bias (3,) from the rests alone, and its standard deviation (3,); None without rests.
+    - `sweeps`: the observations of finished sweeps, or their Faults, by the sweep's index.
+    - `solution`: that of the vector model; if sweeps and rests do not suffice it is None, and `missing` says why.
+    - `bias_rad_s`: the bias (3,) from the rests alone, and its standard deviation (3,); None without rests.
     """
 
     sweeps: Attempts[int, Observation]
@@ -45,7 +46,7 @@ class PartialGyroscope:
 
 @dataclass(frozen=True, slots=True)
 class PartialResults:
-    """The partial results of a run: of every gyroscope, and of other sensors in finished dwells."""
+    """The partial results of a run: those of every gyroscope, and the means of other sensors in finished dwells."""
 
     gyroscopes: Mapping[str, PartialGyroscope]
     at_rest: Attempts[QuantityInDwell, ReadAtRest]
@@ -53,7 +54,7 @@ class PartialResults:
 
 @dataclass(frozen=True, slots=True)
 class _RecordedPart:
-    """What one recording shows of a gyroscope and its accelerometer; `clock` is None if undetermined."""
+    """The observations of a gyroscope and its accelerometer in one recording; `clock` is None if undetermined."""
 
     clock: TimeBase | None
     sweeps: Attempts[int, Observation]
@@ -62,7 +63,10 @@ class _RecordedPart:
 
 
 def so_far(runs: Sequence[RunData]) -> PartialResults:
-    """Return the partial results of raw readings. If a sweep or dwell was repeated, only its last execution is used."""
+    """Return the partial results of a run, from all its recordings so far.
+
+    If a sweep or dwell was repeated, only its last execution is used.
+    """
     sweeps: dict[str, Attempts[int, Observation]] = {}
     rests: dict[str, list[Average]] = {}
     at_rest: Attempts[QuantityInDwell, ReadAtRest] = Attempts()
@@ -98,7 +102,7 @@ def _solve_gyroscope(sweeps: Attempts[int, Observation], rests: Sequence[Average
 
 
 def _observe(run: RunData, name: str, motion: ArmMotion) -> _RecordedPart:
-    """Return the sensor's sweeps, dwells and rests so far, with the faults of those that cannot be used."""
+    """Return the sensor's sweeps, dwells and rests so far, with the Faults of sweeps and dwells that are unusable."""
     sensor = run.sensors[name]
     try:
         stream = synchronize_stream(run.samples[name], sensor, motion)
@@ -152,7 +156,7 @@ def _read_field(
 def _observe_sweeps(
     run: RunData, name: str, stream: Stream, motion: ArmMotion
 ) -> tuple[Attempts[int, Observation], Sequence[Average]]:
-    """Return the observations of sweeps or why they were refused, by the sweep's index, and the averaged rests."""
+    """Return the observations of sweeps, or their Faults, by the sweep's index; and the averages of rests."""
     thresholds = run.settings.observation
     sweeps = observe_each_sweep(run, stream, motion, thresholds)
     dwells = {dwell.index for dwell in run.settings.planned_dwells}

@@ -28,8 +28,9 @@ MIN_READINGS = 20  # fewer may be equal by chance
 class QuantityNoise:
     """The Allan deviation of one quantity at rest, in its SI unit, and the noise parameters of each axis.
 
-    `longest_s`: the longest of the `intervals` without a gap; `total_s`: the sum of all intervals; `temperature_c`:
-    lowest and highest temperature, None without a thermometer.
+    - `intervals`: the number of intervals without a gap.
+    - `longest_s`, `total_s`: the durations of the longest interval and of all together.
+    - `temperature_c`: the lowest and the highest temperature, None without a thermometer.
     """
 
     curve: AllanCurve
@@ -44,7 +45,8 @@ class QuantityNoise:
 class SensorAtRest:
     """The noise of each quantity of a sensor at rest, or the Fault that says why it is unknown.
 
-    `sensor`: None if the readings do not name it; `notes`: what was left out of a log, and how its stamps were read.
+    `sensor` is None for another program's log, which does not describe it. `notes` say what was left out of the log,
+    and how its time stamps were read.
     """
 
     sensor: RecordedSensor | None
@@ -104,7 +106,10 @@ def _summarise_streams(intervals: Sequence[tuple[Stream, slice]], quantity: Quan
 
 
 def _summarise_noise(times_s: Sequence[Array], readings: Sequence[Array], quantity: Quantity) -> QuantityNoise:
-    """Return the noise of intervals at rest with times (nᵢ,) and readings (nᵢ, 3). Raise Fault `stuck_sensor`."""
+    """Return the noise of intervals at rest, each with times (nᵢ,) and readings (nᵢ, 3).
+
+    Raise Fault `recording_too_short` without an interval, `stuck_sensor` if an axis repeats one number all the time.
+    """
     if not readings:
         raise too_short("nothing stood still for longer than a few readings")
     if any(not np.ptp(reading, axis=0).all() for reading in readings if len(reading) > MIN_READINGS):

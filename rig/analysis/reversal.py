@@ -28,7 +28,10 @@ class ReversalRun:
 
 @dataclass(frozen=True, slots=True)
 class MagnetometerReversal:
-    """One magnetometer in several runs; `scale` (3,) and `correction_matrix` (3, 3) are means over the runs."""
+    """One magnetometer in several runs: its bias separated from the arm's field (`separation`).
+
+    `scale`, `scale_std` (3,) and `correction_matrix` (3, 3) are those of the mean over all runs.
+    """
 
     runs: tuple[ReversalRun, ...]
     separation: Reversal
@@ -38,10 +41,11 @@ class MagnetometerReversal:
 
 
 def reversals(runs: Sequence[tuple[str, Outcome]]) -> dict[str, MagnetometerReversal]:
-    """Return for each magnetometer of the first run its bias and the arm's field, separated by two or more named runs.
+    """Return the bias and the arm's field for each magnetometer of the first run, by its name.
 
-    Raise Refused `too_few_runs`, `no_magnetometer` if a run did not record or calibrate a magnetometer of the first
-    run, `runs_do_not_match` with the difference, and what `separate` raises.
+    `runs` are the names and outcomes of two or more runs. Raise Refused `too_few_runs`; `no_magnetometer` if a run did
+    not record or calibrate a magnetometer of the first run; `runs_do_not_match`, whose message says in what they
+    differ; and what `separate` raises.
     """
     if len(runs) < 2:
         raise Refused("too_few_runs", "one run cannot separate the bias from the arm's field", REMEDY)
@@ -86,7 +90,7 @@ def _reversal(runs: Sequence[ReversalRun]) -> MagnetometerReversal:
 
 
 def _scale_std(results: Sequence[MagnetometerResult]) -> Array:
-    """Return the standard deviations (3,) of mean scale factors; the field's uncertainty is common to all runs."""
+    """Return the standard deviations (3,) of the mean scale factors; all runs share the error of the field's size."""
     shared = results[0].budget.std_of(SIZE_OF_FIELD)[:3]
     independent = [result.budget.std[:3] ** 2 - result.budget.std_of(SIZE_OF_FIELD)[:3] ** 2 for result in results]
     std: Array = np.sqrt(np.sum(independent, axis=0) / len(results) ** 2 + shared**2)
@@ -94,7 +98,7 @@ def _scale_std(results: Sequence[MagnetometerResult]) -> Array:
 
 
 def _list_common(run: ReversalRun) -> dict[str, object]:
-    """Return the values, by name, in which the runs of a reversal must agree."""
+    """Return the values that must be the same in all runs of a reversal, by the words for them in messages."""
     sensor, settings = run.result.sensor, run.outcome.settings
     return {
         "the magnetometer": (sensor.part, sensor.serial_number),

@@ -28,7 +28,7 @@ CLOCKS = "clocks_agree"
 
 @dataclass(frozen=True, slots=True)
 class ExpandedUncertainty:
-    """Expanded uncertainties (3,) with their coverage factors and degrees of freedom, (3,) each."""
+    """Expanded uncertainties of three axes, with their coverage factors and degrees of freedom, (3,) each."""
 
     expanded: Array
     factors: Array
@@ -45,13 +45,16 @@ class _LimitSet:
     rule: DecisionRule = "simple"
 
     def check(self, what: str, value: float | None) -> Check:
-        """Return the check of one limit."""
+        """Return the check of `value` against the limit of the criterion `what`."""
         row, limit = limit_of(self.limits, self.quantity, what)
         means = Meaning(row.kind, self.sensor, self.quantity, row.parameter, what=what)
         return Check(name_check(self.sensor, self.quantity, what), value, limit, row.unit, means)
 
     def nearest(self, what: str, values: Array, uncertainty: ExpandedUncertainty | None) -> Check:
-        """Return the check of the axis that, by the decision rule, exceeds the limit most or comes nearest to it."""
+        """Return the check of the criterion `what` for the worst of three axes.
+
+        This is the axis whose value, together with the guard of the decision rule, is largest in magnitude.
+        """
         check = self.check(what, _largest_magnitude(values))
         if uncertainty is None or check.value is None:
             return check
@@ -73,7 +76,10 @@ class _LimitSet:
         std: Array,
         uncertainties: tuple[ExpandedUncertainty | None, ExpandedUncertainty | None],
     ) -> tuple[Check, ...]:
-        """Return the checks of scale and bias, (3,) each with its expanded uncertainty, and of their `std` (6,)."""
+        """Return the checks of `scale` (3,) and `bias` (3,), and of their standard uncertainties `std` (6,).
+
+        `uncertainties` are the expanded ones of scale and of bias, None if there is no budget.
+        """
         return (
             self.nearest("scale_deviation", scale - 1, uncertainties[0]),
             self.check("scale_std", _largest_magnitude(std[:3])),
@@ -82,7 +88,7 @@ class _LimitSet:
         )
 
     def check_expanded(self, **expanded: Array) -> Iterator[Check]:
-        """Yield the checks of expanded uncertainties (3,) that have a limit, by their names."""
+        """Yield a check of each of the `expanded` uncertainties (3,) that has a limit; keywords name the criteria."""
         for what, uncertainty in expanded.items():
             if limit_of(self.limits, self.quantity, what)[1] is not None:
                 yield self.check(what, _largest_magnitude(uncertainty))
@@ -94,10 +100,10 @@ def judge(
     budgets: Mapping[str, Budget] = MappingProxyType({}),
     rule: DecisionRule = "simple",
 ) -> tuple[Check, ...]:
-    """Return the checks of every gyroscope by name.
+    """Return the checks of the solutions of all gyroscopes against `limits`.
 
-    With a budget, its combined uncertainties are judged, and the decision `rule` applies to values. Without a budget,
-    only the uncertainty due to noise is judged.
+    If a gyroscope has a budget, its combined uncertainties are judged, and the decision `rule` applies to the values.
+    Otherwise only the uncertainty due to noise is judged.
     """
     checks: list[Check] = []
     for name, solution in solutions.items():
@@ -112,10 +118,11 @@ def judge(
 
 
 def verification_checks(sensor: str, verification: "Verification | None", limits: Limits | None) -> tuple[Check, ...]:
-    """Return the checks of calibrated readings: the largest RMS error of an axis, the largest mean error of a turn.
+    """Return the checks of the readings that the board has calibrated.
 
-    The limit of the mean also applies to the reference's own error, which may be the cause. If `verification` is None,
-    the checks have no value.
+    They are of the largest RMS error of an axis, of the largest mean error in a revolution, and of the reference's own
+    error, which may be the cause of these and has the limit of the mean error. If `verification` is None, the checks
+    have no value, so they fail.
     """
     rms = mean = verified = None
     if verification is not None:
@@ -131,9 +138,9 @@ def verification_checks(sensor: str, verification: "Verification | None", limits
 
 
 def clock_checks(clocks: Sequence[ClockCheck]) -> tuple[Check, ...]:
-    """Return the checks that a run's clocks agree within their stated and measured uncertainty.
+    """Return a check for each pair of a run's clocks that they agree within their stated and measured uncertainty.
 
-    For each pair, the recording with the largest difference is used.
+    Each is of the recording in which the two differ most.
     """
     means = Meaning("fitness", what=CLOCKS)
     return tuple(
@@ -146,9 +153,9 @@ def clock_checks(clocks: Sequence[ClockCheck]) -> tuple[Check, ...]:
 def acceleration_checks(
     sensor: str, result: "AccelerometerResult", limits: Limits | None, rule: DecisionRule = "simple"
 ) -> tuple[Check, ...]:
-    """Return the checks of an accelerometer's scale and bias, their uncertainty, and gravity in held-out attitudes.
+    """Return the checks of an accelerometer's scale and bias, and of their combined uncertainties in the budget.
 
-    The budget's combined uncertainties are judged.
+    If a repeat of the attitudes was left out of the solution, the error of gravity in these attitudes is checked too.
     """
     limit_set = _LimitSet(sensor, "acceleration", limits, rule)
     uncertainties = _split_expanded(result.budget)
@@ -161,7 +168,7 @@ def acceleration_checks(
 def drift_checks(
     sensor: str, drifts: Mapping[Quantity, "BiasDrift"], limits: Limits | None, rule: DecisionRule = "simple"
 ) -> tuple[Check, ...]:
-    """Return the checks of the largest change of a bias between any two repeats."""
+    """Return for each quantity a check of the largest change of its bias between any two repeats."""
     checks = []
     for quantity, drift in drifts.items():
         std = drift.scale_fixed.largest_change_std

@@ -66,7 +66,7 @@ class RevolutionError:
     """Mean reading minus mean rate of the reference, over one revolution or arc.
 
     - `sweep`: its index in the plan; `joint_name`, `direction`: the joint that turns, and which way.
-    - `angle_rad`: the angle turned, None for a whole revolution.
+    - `angle_rad`: the angle turned, 2π for a whole revolution.
     - `error_rad_s`, `std_rad_s` (3,): the difference, and its standard deviation due to noise.
     - `gravity_rad_s` (3,): the part of the error that gravity explains, None if no calibration determines it.
     """
