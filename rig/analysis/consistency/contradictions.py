@@ -13,16 +13,17 @@ from rig.analysis.consistency.detection_limits import DetectionLimit, find_gyros
 from rig.analysis.consistency.false_alarms import FALSE_ALARM_PROBABILITY, NON_ORTHOGONALITY, false_alarm_per_check
 from rig.analysis.consistency.frozen_axis import find_longest_frozen
 from rig.analysis.consistency.gyroscope_checks import DISTURBED_SWEEP
-from rig.analysis.consistency.residual_tests import Statistic
+from rig.analysis.consistency.residual_tests import Statistic, TestResults
 from rig.analysis.consistency.systematic_errors import build_error_patterns, collect_known_errors
 from rig.analysis.environment import MeasurementEnvironment, find_environment
 from rig.analysis.gyroscope.calibration import SensorResult, solve_observed
-from rig.analysis.gyroscope.segment_table import append_transfers, stack_segments
+from rig.analysis.gyroscope.segment_table import Segments, append_transfers, stack_segments
 from rig.analysis.numeric_errors import solvable
 from rig.data.quantity import ACCELERATION, FIELD, RATE, Quantity
 from rig.data.recording.run_data import RunData
 from rig.data.recording.settings import RunSettings
 from rig.errors import RigError
+from rig.estimation.gyroscope.vector_fit import VectorFit
 from rig.estimation.gyroscope.vector_model import VectorSolution
 from rig.observation.consistency.segments import segment_recordings
 from rig.observation.consistency.transfers import average_transfers
@@ -61,42 +62,28 @@ def contradictions(
 ) -> ConsistencyChecks:
     """Return the checks for contradictions in the gyroscopes' recordings.
 
-    `false_alarms` is the fraction of undamaged runs that may fail. The check of a disturbed sweep has the sweep's index
-    in its name, `gyro.disturbed_sweep.3`, and in its meaning. `has_limits`: whether to compute the detection limits,
-    which takes a third of the time.
+    `false_alarms` is the probability that any check fails in a run without a fault. The check of a disturbed sweep has
+    the sweep's index in its name, `gyro.disturbed_sweep.3`, and in its meaning. `has_limits`: whether to compute the
+    detection limits, which takes a third of the time.
     """
     checks: list[Check] = []
     detection_limits: dict[str, tuple[DetectionLimit, ...]] = {}
     false_alarm_probability = _false_alarm_probability(recordings[0].run, sensors, settings, false_alarms)
     for name in sensors:
-        explained = results[name].explained
-        if explained is None:
+        result = results[name]
+        if (explained := result.explained) is None:
             continue
-        windows = segment_recordings(name, recordings)
-        segments = stack_segments(windows, explained, settings.site)
-        known_errors = collect_known_errors(
-            environment, name, results[name], recordings[0].run.sensors[name].stamp_std_s
+        segments, tested = _test_segments(
+            name,
+            recordings,
+            result,
+            explained,
+            environment=environment,
+            settings=settings,
+            false_alarm_probability=false_alarm_probability,
         )
-        matrix, extension_m = explained.solution.matrix, np.array(settings.extension_m)
-        transfers = average_transfers(name, recordings, matrix, settings.site, extension_m)
-        with_transfers_averaged = append_transfers(segments, transfers, windows, explained)
-        allowance = build_error_patterns(known_errors, segments, with_transfers_averaged, matrix)
-        tested = gyroscope_checks.check_gyroscope(segments, matrix, false_alarm_probability, allowance)
-        sensor = recordings[0].run.sensors[name]
-        gyroscope = sensor.channel(RATE)
-        counts = [gyroscope.counts(recording.run.samples[name]).astype(np.int64) for recording in recordings]
-        disturbed = {
-            results[name].observations[index].sweep: statistic for index, statistic in tested.disturbed.items()
-        }
-        sweeps = [fitness(name, "rate", DISTURBED_SWEEP, *disturbed[sweep], sweep=sweep) for sweep in sorted(disturbed)]
-        checks += sweeps or [fitness(name, "rate", DISTURBED_SWEEP, *tested.worst)]
-        of_readings = converter_tests.judge_readings(
-            counts,
-            segments.readings,
-            false_alarm_probability,
-            digits=converter_tests.find_digits(sensor, RATE, [recording.run.samples[name] for recording in recordings]),
-            frozen=max(find_longest_frozen(recording, name) for recording in recordings),
-        )
+        of_readings = _test_readings(name, recordings, segments, false_alarm_probability)
+        checks += _check_sweeps(name, result, tested)
         checks += [
             fitness(name, "rate", what, *statistic) for what, statistic in {**tested.statistics, **of_readings}.items()
         ]
@@ -104,9 +91,54 @@ def contradictions(
         non_orthogonality = _non_orthogonality_deg(explained.solution, stated_deg, false_alarm_probability)
         checks.append(fitness(name, "rate", NON_ORTHOGONALITY, *non_orthogonality, unit="°"))
         if has_limits:
-            limits = find_gyroscope_limits(tested.detection_limits, name, results[name], environment)
-            detection_limits[name] = tuple(limits)
+            detection_limits[name] = tuple(find_gyroscope_limits(tested.detection_limits, name, result, environment))
     return ConsistencyChecks(tuple(checks), detection_limits)
+
+
+def _test_segments(
+    name: str,
+    recordings: Sequence[ObservedRun],
+    result: SensorResult,
+    explained: VectorFit,
+    *,
+    environment: MeasurementEnvironment,
+    settings: RunSettings,
+    false_alarm_probability: float,
+) -> tuple[Segments, TestResults]:
+    """Return the segments of a gyroscope's sweeps and rests, and the tests whether one model explains them all."""
+    matrix, windows = explained.solution.matrix, segment_recordings(name, recordings)
+    segments = stack_segments(windows, explained, settings.site)
+    # All sweeps about one axis follow each other, so they do not show a change of that axis before or after them. The
+    # transfers between them do, so lasting changes are tested with the transfers as further segments.
+    transfers = average_transfers(name, recordings, matrix, settings.site, np.array(settings.extension_m))
+    with_transfers = append_transfers(segments, transfers, windows, explained)
+    # The effects of known errors of arm and sensor are allowed: the tests do not count them as contradictions.
+    known_errors = collect_known_errors(environment, name, result, recordings[0].run.sensors[name].stamp_std_s)
+    allowance = build_error_patterns(known_errors, segments, with_transfers, matrix)
+    return segments, gyroscope_checks.check_gyroscope(segments, matrix, false_alarm_probability, allowance)
+
+
+def _check_sweeps(name: str, result: SensorResult, tested: TestResults) -> list[Check]:
+    """Return a failing check for each disturbed sweep; if there is none, a single check, of the worst sweep."""
+    disturbed = {result.observations[index].sweep: statistic for index, statistic in tested.disturbed.items()}
+    if not disturbed:
+        return [fitness(name, "rate", DISTURBED_SWEEP, *tested.worst)]
+    return [fitness(name, "rate", DISTURBED_SWEEP, *disturbed[sweep], sweep=sweep) for sweep in sorted(disturbed)]
+
+
+def _test_readings(
+    name: str, recordings: Sequence[ObservedRun], segments: Segments, false_alarm_probability: float
+) -> Mapping[str, Statistic]:
+    """Return the tests of a gyroscope's converter from its single readings, by the name of the check."""
+    sensor = recordings[0].run.sensors[name]
+    samples = [recording.run.samples[name] for recording in recordings]
+    return converter_tests.judge_readings(
+        [sensor.channel(RATE).counts(recorded).astype(np.int64) for recorded in samples],
+        segments.readings,
+        false_alarm_probability,
+        digits=converter_tests.find_digits(sensor, RATE, samples),
+        frozen=max(find_longest_frozen(recording, name) for recording in recordings),
+    )
 
 
 def _non_orthogonality_deg(solution: VectorSolution, stated_deg: float, false_alarm_probability: float) -> Statistic:

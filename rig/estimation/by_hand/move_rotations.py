@@ -51,48 +51,74 @@ class GyroscopeModel:
     nonlinearities: Array
 
 
+@dataclass(frozen=True, slots=True)
+class _MoveIntegral:
+    """The rotation in one move: an element of each field of `MoveIntegrals`.
+
+    `by_theta` (3, 12): J of the matrix (9 columns) and of the bias (3 columns).
+    """
+
+    rotation: Array
+    by_theta: Array
+    by_gravity: Array
+    by_nonlinearity: Array
+    swept_rad: Array
+    duration_s: float
+    path_rad: float
+    change_rad_s: float
+
+
 def integrate_moves(session: HandRecording, gyroscope: GyroscopeModel, up: Array) -> MoveIntegrals:
     """Return each move's rotation, integrated from the readings, and its derivatives with respect to `gyroscope`.
 
     `up` (N, 3) is the vertical in the body at each rest.
     """
-    matrix, biases, sensitivity = gyroscope.matrix, gyroscope.biases, gyroscope.sensitivity
-    factors = gyroscope.nonlinearities
-    middles = np.array([(rest.start_s + rest.end_s) / 2 for rest in session.rests])
-    inverse = np.linalg.inv(matrix)
-    rotations, by_theta, by_gravity, by_nonlinearity, swept = (list[Array]() for _ in range(5))
-    durations, paths, changes = (list[float]() for _ in range(3))
-    for row, move in enumerate(session.moves):
+    middles_s = np.array([(rest.start_s + rest.end_s) / 2 for rest in session.rests])
+    integrals = []
+    for move, up_at_start in zip(session.moves, up, strict=False):  # the last rest has no move after it
         inside = _select_inside(session.time_s, move.start_s, move.end_s)
         times_s = session.time_s[inside]
-        corrected = session.rates[inside] - np.column_stack([np.interp(times_s, middles, axis) for axis in biases.T])
+        bias = np.column_stack([np.interp(times_s, middles_s, axis) for axis in gyroscope.biases.T])
+        integrals.append(_integrate_move(times_s, session.rates[inside] - bias, gyroscope, up_at_start))
+    return _stack_moves(integrals)
+
+
+def _integrate_move(times_s: Array, unbiased: Array, gyroscope: GyroscopeModel, up: Array) -> _MoveIntegral:
+    """Return the rotation in one move from readings (m, 3) minus bias; `up` (3,) is the vertical at its start."""
+    matrix, sensitivity, factors = gyroscope.matrix, gyroscope.sensitivity, gyroscope.nonlinearities
+    corrected, path = unbiased, track(times_s, unbiased, matrix)
+    squares = np.stack([unbiased**2, unbiased * np.abs(unbiased)], axis=1)  # even and odd nonlinearity
+    if sensitivity.any() or factors.any():  # the first path shows the vertical during the move
+        bent = (squares * factors.reshape(2, 3)).sum(axis=1)
+        corrected = unbiased - up @ path.attitudes @ sensitivity.T - bent
         path = track(times_s, corrected, matrix)
-        squares = np.stack([corrected**2, corrected * np.abs(corrected)], axis=1)  # even and odd nonlinearity
-        if sensitivity.any() or factors.any():  # the first path shows the vertical during the move
-            bent = (squares * factors.reshape(2, 3)).sum(axis=1)
-            corrected = corrected - up[row] @ path.attitudes @ sensitivity.T - bent
-            path = track(times_s, corrected, matrix)
-        rotations.append(path.attitudes[-1])
-        by_theta.append(path.sensitivity)
-        lasting_s = _durations(times_s)
-        turned = path.attitudes @ inverse * -lasting_s[:, None, None]  # rotation per error of each reading
-        by_gravity.append(np.tensordot(turned, up[row] @ path.attitudes, (0, 0)).reshape(3, 9))
-        by_nonlinearity.append(np.einsum("kij,kbj->ibj", turned, squares).reshape(3, 6))
-        swept.append(lasting_s @ corrected)
-        durations.append(float(np.ptp(times_s)))
-        paths.append(float(lasting_s @ np.linalg.norm(path.rates_rad_s, axis=1)))
-        changes.append(float(np.linalg.norm(path.rates_rad_s[2:] - path.rates_rad_s[:-2]) / 2))
-    theta = _stack(by_theta, (3, 12))
+    lasting_s = _durations(times_s)
+    turned = path.attitudes @ np.linalg.inv(matrix) * -lasting_s[:, None, None]  # rotation per error of each reading
+    return _MoveIntegral(
+        rotation=path.attitudes[-1],
+        by_theta=path.sensitivity,
+        by_gravity=np.tensordot(turned, up @ path.attitudes, (0, 0)).reshape(3, 9),
+        by_nonlinearity=np.einsum("kij,kbj->ibj", turned, squares).reshape(3, 6),
+        swept_rad=lasting_s @ corrected,
+        duration_s=float(np.ptp(times_s)),
+        path_rad=float(lasting_s @ np.linalg.norm(path.rates_rad_s, axis=1)),
+        change_rad_s=float(np.linalg.norm(path.rates_rad_s[2:] - path.rates_rad_s[:-2]) / 2),
+    )
+
+
+def _stack_moves(moves: Sequence[_MoveIntegral]) -> MoveIntegrals:
+    """Return the integrals of all moves as arrays, which are empty without moves."""
+    by_theta = _stack([move.by_theta for move in moves], (3, 12))
     return MoveIntegrals(
-        _stack(rotations, (3, 3)),
-        theta[..., :9],
-        theta[..., 9:],
-        _stack(by_gravity, (3, 9)),
-        _stack(by_nonlinearity, (3, 6)),
-        _stack(swept, (3,)),
-        np.array(durations),
-        np.array(paths),
-        np.array(changes),
+        rotations=_stack([move.rotation for move in moves], (3, 3)),
+        by_matrix=by_theta[..., :9],
+        by_bias=by_theta[..., 9:],
+        by_gravity=_stack([move.by_gravity for move in moves], (3, 9)),
+        by_nonlinearity=_stack([move.by_nonlinearity for move in moves], (3, 6)),
+        swept_rad=_stack([move.swept_rad for move in moves], (3,)),
+        durations_s=np.array([move.duration_s for move in moves]),
+        paths_rad=np.array([move.path_rad for move in moves]),
+        changes_rad_s=np.array([move.change_rad_s for move in moves]),
     )
 
 
