@@ -46,10 +46,7 @@ class Check:
 
     @property
     def false_acceptance(self) -> float | None:
-        """The probability that the true value of a passed check is beyond the limit.
-
-        None if the check failed, or if its value has no uncertainty.
-        """
+        """The probability that the true value of a passed check is beyond the limit; None if it failed or has no U."""
         if self.value is None or self.limit is None or not self.uncertainty or not self.passed:
             return None
         return float(tail_probability((self.limit - self.value) * self.coverage_factor / self.uncertainty, self.dof))

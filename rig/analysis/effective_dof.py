@@ -23,10 +23,7 @@ if TYPE_CHECKING:
 
 
 def angle_dof(result: "SensorResult") -> Array | None:
-    """Return the degrees of freedom (6,) of a gyroscope's three angles of non-orthogonality, then of its mounting.
-
-    Return None without a vector solution or a budget.
-    """
+    """Return the degrees of freedom (6,) of a gyroscope's non-orthogonality, then mounting; None without a budget."""
     explained, budget = result.explained, result.uncertainty
     if explained is None or budget is None:
         return None
@@ -137,10 +134,7 @@ def _angle_derivatives(matrix: Array) -> Array:
 
 
 def _drift_covariance(explained: VectorFit) -> Array:
-    """Return for each axis the part of the covariance of the vector model's p coefficients that is due to bias drift.
-
-    The shape is (3, p, p).
-    """
+    """Return bias drift's part (3, p, p) in the covariance of each axis' p coefficients of the vector model."""
     inputs = explained.inputs
     gravity = None if explained.solution.g_sensitivity is None else inputs.apparent_gravity_m_s2
     design = design_matrix(inputs.rates_rad_s, gravity)

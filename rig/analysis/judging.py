@@ -123,10 +123,7 @@ def _judge_gyroscopes(
     estimator: Estimator,
     polynomials: "Polynomials",
 ) -> _GyroscopeOutcome:
-    """Return the part of an outcome that is about gyroscopes.
-
-    It contains their calibrations, and checks of limits, of the board's arithmetic, of contradictions, and of clocks.
-    """
+    """Return the part of an outcome that is about gyroscopes: their calibrations, their checks, and those of clocks."""
     environment = find_environment(recordings, settings)
     results = solve_observed(runs[0].measuring(RATE), recordings, environment, estimator, settings.matrix_corrected)
     if polynomials:
@@ -169,10 +166,7 @@ class _DwellOutcome:
 def _judge_dwells(
     recordings: tuple[ObservedRun, ...], settings: RunSettings, swept: _GyroscopeOutcome, *, drifting: bool
 ) -> _DwellOutcome:
-    """Return the part of an outcome that is about accelerometers and magnetometers.
-
-    `swept` contains the gyroscopes' results, to which accelerometers are aligned.
-    """
+    """Return the part about accelerometers, aligned to the gyroscopes in `swept`, and about magnetometers."""
     from rig.analysis.reference.accelerometer import calibrate_accelerometers
     from rig.analysis.reference.magnetometer import calibrate_magnetometers
 

@@ -103,10 +103,7 @@ def find_pair(looks: Sequence[LookedFile]) -> tuple[LookedFile | None, LookedFil
 
 
 def join_maps(looks: Sequence[LookedFile]) -> dict[str, Any]:
-    """Return one map of the columns of all files.
-
-    Attitudes in the file with the readings are left out if another file has attitudes without readings.
-    """
+    """Return one map of all files' columns; attitudes in a log are left out if another file is the reference."""
     reference = _find_reference(looks)
     columns: dict[str, Any] = {}
     for looked in reversed(looks):  # if there are two files, the first has the readings
@@ -156,10 +153,7 @@ def is_incomplete(columns: Mapping[str, Any]) -> bool:
 
 
 def _read_numbers(path: Path, layout: TableLayout) -> tuple[Array, Array | None]:
-    """Return all numbers (n, k) of a table, NaN if missing, and the times (n,) in the unit of their column.
-
-    The times are None if the table has no column of times.
-    """
+    """Return all numbers (n, k) of a table, NaN if missing, and the times (n,) in their column's unit, None without."""
     unit_s = 1.0 if layout.time_unit is None else UNITS[layout.time_unit].size
     # A workspace of MATLAB has columns of other tables too: there a column's number is not that in the layout.
     names = layout.headings if is_mat(path) else [str(index + 1) for index in range(len(layout.headings))]
@@ -200,10 +194,7 @@ def _map_of(layout: TableLayout, guess: LogColumns) -> dict[str, Any]:
 
 
 def _read_contents(looked: LookedFile, column_map: ColumnMap, *, has_readings: bool, has_attitudes: bool) -> LookedFile:
-    """Return `looked` with the readings and attitudes of its file; `refusals` are the reasons why any cannot be read.
-
-    `has_readings` and `has_attitudes`: whether to read them.
-    """
+    """Return `looked` with the readings and attitudes of its file; `refusals` say why any cannot be read."""
     refusals: list[RigError] = []
     if has_readings:
         try:

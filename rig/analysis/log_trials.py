@@ -31,10 +31,7 @@ def find_allan_obstacle(samples: Samples) -> RigError | None:
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """An attempt at a solution of the sensors named in `only`, or of all if it is empty.
-
-    `obstacle` says why the attempt failed; None if it did not.
-    """
+    """An attempt to solve the sensors named in `only`, all if empty; `obstacle` says why it failed, None if not."""
 
     only: tuple[str, ...] = ()
     obstacle: str | None = None
@@ -56,10 +53,7 @@ def try_turns(path: Path, column_map: ColumnMap) -> Trial:
 def try_attitudes(
     path: Path, reference: Path, column_map: ColumnMap, up: str, *, find_clock: bool, sensors: Sequence[str]
 ) -> Trial:
-    """Return an attempt to solve a log in the attitudes of a reference.
-
-    If not all `sensors` have a solution, the gyroscope alone is tried.
-    """
+    """Return an attempt to solve all sensors of a log in a reference's attitudes; if it fails, the gyroscope alone."""
     files = Files(path, reference, "attitudes", Item("imu"), None, column_map)
     trial = Trial()
     for only in ((), (RATE.sensor,)) if len(sensors) > 1 and RATE.sensor in sensors else ((),):
@@ -71,10 +65,7 @@ def try_attitudes(
 
 
 def _find_obstacle(files: Files, request: SolveOptions, up: str) -> str | None:
-    """Return why the files have no solution, or which checks fail; None if all pass.
-
-    `up` is the axis of the reference's room that points upwards.
-    """
+    """Return why the files have no solution with the axis `up` upwards, or which checks fail; None if all pass."""
     x, y, z = axis_of(up).tolist()
     site = Site(up=(x, y, z), gravity_m_s2=STANDARD_GRAVITY_M_S2, earth_rate_rad_s=None)
     try:

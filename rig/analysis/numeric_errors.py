@@ -10,10 +10,7 @@ LIBRARIES = ("numpy.", "scipy.")
 
 @contextmanager
 def solvable() -> Iterator[None]:
-    """Raise Fault `not_solvable` instead of a ValueError that NumPy or SciPy raises in the block.
-
-    A ValueError that the project's own code raises is not replaced.
-    """
+    """Raise Fault `not_solvable` for a ValueError of NumPy or SciPy in the block, not for one of our own code."""
     try:
         yield
     except ValueError as error:  # includes NumPy's LinAlgError

@@ -63,10 +63,7 @@ class _RecordedPart:
 
 
 def so_far(runs: Sequence[RunData]) -> PartialResults:
-    """Return the partial results of a run, from all its recordings so far.
-
-    If a sweep or dwell was repeated, only its last execution is used.
-    """
+    """Return the partial results of a run; if a sweep or dwell was repeated, only its last execution is used."""
     sweeps: dict[str, Attempts[int, Observation]] = {}
     rests: dict[str, list[Average]] = {}
     at_rest: Attempts[QuantityInDwell, ReadAtRest] = Attempts()

@@ -51,10 +51,7 @@ class _LimitSet:
         return Check(name_check(self.sensor, self.quantity, what), value, limit, row.unit, means)
 
     def nearest(self, what: str, values: Array, uncertainty: ExpandedUncertainty | None) -> Check:
-        """Return the check of the criterion `what` for the worst of three axes.
-
-        This is the axis whose value, together with the guard of the decision rule, is largest in magnitude.
-        """
+        """Return the check of the axis with the largest magnitude of value plus guard by the decision rule."""
         check = self.check(what, _largest_magnitude(values))
         if uncertainty is None or check.value is None:
             return check

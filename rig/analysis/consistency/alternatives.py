@@ -82,10 +82,7 @@ FAULT_MODES: tuple[FaultMode[Means], ...] = (  # (k, N, 3) each
 
 
 def changes(segments: Segments, axis_rates: Array) -> dict[str, Array]:
-    """Return the effects on the means of scale factors or a mounting that change steadily, by the name of the check.
-
-    The effects (3, N, 3) are three columns, each with the values of axes x, y, z in N segments.
-    """
+    """Return the effects (3, N, 3) of scale factors or a mounting that change steadily, by the name of the check."""
     time = normalise_time(segments)
     for sweep in distinct(segments.sweep):  # a change within a sweep is tested for that sweep
         time[segments.sweep == sweep] = time[segments.sweep == sweep].mean()
@@ -113,10 +110,7 @@ def differences(segments: Segments, axis_rates: Array, whole: Array | None) -> d
 
 
 def single_axis_columns(segments: Segments, axis_rates: Array) -> Array:
-    """Return the effects (3, N, k) of a scale factor of one axis that changes at the start of a sweep or transfer.
-
-    There is a column for each axis and each such start, except the first.
-    """
+    """Return the effects (3, N, k) of a scale factor of one axis that changes where a sweep or transfer starts."""
     moving = distinct(segments.sweep[segments.sweep != REST])
     starts = distinct(np.array([segments.times_s[segments.sweep == sweep].min() for sweep in moving]))
     later = segments.times_s.mean(axis=1)[:, None] > starts[1:]

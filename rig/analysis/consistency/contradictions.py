@@ -200,10 +200,7 @@ def check_references(
 
 
 def _false_alarm_probability(run: RunData, sensors: Sequence[str], settings: RunSettings, false_alarms: float) -> float:
-    """Return the false-alarm probability of one check, if all checks of a run share the probability `false_alarms`.
-
-    These are the checks of the gyroscopes `sensors`, of the accelerometers to calibrate, and of all magnetometers.
-    """
+    """Return the false-alarm probability of one check, if all checks of a run share the probability `false_alarms`."""
     accelerometers = run.measuring(ACCELERATION).keys() & settings.to_calibrate
     return false_alarm_per_check(len(sensors) + len(accelerometers) + len(run.measuring(FIELD)), of_all=false_alarms)
 

@@ -11,8 +11,5 @@ CHECKS = (*gyroscope_checks.CHECKS, DISTURBED_SWEEP, *converter_tests.CHECKS, NO
 
 
 def false_alarm_per_check(kinds: int, *, of_all: float = FALSE_ALARM_PROBABILITY) -> float:
-    """Return the false-alarm probability of one check if all checks share the probability `of_all`.
-
-    Each of the `kinds` of readings, such as the rates of one gyroscope, has as many checks.
-    """
+    """Return the false-alarm probability of each check, if the checks of all `kinds` of readings share `of_all`."""
     return false_alarm_of_each(of_all, len(CHECKS) * kinds)

@@ -366,9 +366,6 @@ def _build_scatter(segments: Segments, patterns_rad_s: Array, allowance: ErrorPa
 
 
 def _steady_columns(segments: Segments, *more: Array) -> Array:
-    """Return an orthonormal basis (N, k) of these effects: a level of each sweep and of all rests, gravity, and drift.
-
-    The drift is steady. The columns `more` are added before the basis is formed.
-    """
+    """Return an orthonormal basis (N, k) of levels of each sweep and of all rests, gravity, steady drift and `more`."""
     levels = [segments.sweep == sweep for sweep in distinct(segments.sweep)]
     return orthonormal_basis(np.column_stack([*levels, segments.gravity_m_s2, normalise_time(segments), *more]))

@@ -90,10 +90,7 @@ class WhitenedReference:
     def minimal_detectable_size(
         self, fault_patterns: Array, alternatives: Sequence[Array], false_alarm_probability: float
     ) -> float:
-        """Return the smallest size of a fault that a test of one of the `alternatives` detects.
-
-        `fault_patterns` (n, k) are the changes of the readings by one unit of the fault.
-        """
+        """Return the smallest fault, in units of `fault_patterns` (n, k), that one of the `alternatives` detects."""
         model = self._extend_model(())
         delta_rad = self._estimate_delta(model)
         size = np.sqrt(1 + delta_rad**2 * self.growth)[:, None]

@@ -112,10 +112,7 @@ def orthonormal_basis(columns: Array) -> Array:
 
 
 def remaining_directions(model_basis: Array, columns: Array) -> Array:
-    """Return an orthonormal basis (n, k) of the parts of `columns` that are orthogonal to `model_basis` (n, p).
-
-    `model_basis` is orthonormal. Columns that lie almost in its span are dropped.
-    """
+    """Return an orthonormal basis (n, k) of the parts of `columns` orthogonal to the basis `model_basis` (n, p)."""
     sizes = np.linalg.norm(columns, axis=0)
     new = columns / np.where(sizes > 0, sizes, 1.0)
     new = new - model_basis @ (model_basis.T @ new)

@@ -18,10 +18,7 @@ TIME_TOLERANCE_S = 1e-5  # times that differ by more belong to different edges
 
 
 def build_time_patterns(segments: Segments, jitter_s: float) -> Array:
-    """Return the patterns (P, N, 3) rad/s of errors of the times at the edges of a sweep's segments.
-
-    `jitter_s` is the standard deviation of these times. Each edge has one pattern.
-    """
+    """Return the patterns (P, N, 3) rad/s of errors of the times at which the segments of sweeps begin and end."""
     lengths = np.diff(segments.times_s)
     by_rate = jitter_s * segments.rates_rad_s / lengths
     effects = [

@@ -303,10 +303,7 @@ def _wave_indices(motion: ArmMotion) -> dict[int, int]:
 
 
 def _end_patterns(interval: MotionInterval) -> list[Array]:
-    """Return the errors (3,) of a transfer's mean rate, rad/s per rad, due to an angle error of a joint at one end.
-
-    There is one for each end and each joint that moved.
-    """
+    """Return the errors (3,) of a transfer's mean rate per radian of angle error, of each moved joint at each end."""
     q_rad = interval.motion.angles(np.array([interval.start_s, interval.end_s]))
     axes = interval.motion.axes(q_rad) / (interval.end_s - interval.start_s)
     moved = [joint for joint in _wave_indices(interval.motion) if np.ptp(q_rad[:, joint]) >= STILL_RAD]

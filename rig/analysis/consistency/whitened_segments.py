@@ -98,10 +98,7 @@ class WhitenedSegments:
         yield from ((column[..., None], limit) for column in np.moveaxis(columns, -1, 0))
 
     def _independent_columns(self, columns: Array) -> Array:
-        """Return the parts of whitened columns that are orthogonal to the model, as unit columns (3 N, k).
-
-        Columns that lie in the model are dropped.
-        """
+        """Return the parts outside the model of whitened columns, as unit columns (3 N, k); zero parts are dropped."""
         new = apply_whitener(self.whitener, columns)
         sizes = np.linalg.norm(new, axis=0)
         new = new - self.basis @ (self.basis.T @ new)

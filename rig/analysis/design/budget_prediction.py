@@ -108,10 +108,7 @@ def _simulate_readings(inputs: VectorInputs, matrix: Array) -> Array:
 
 
 def _clock(uncertainty: Uncertainty, *, on_board: bool) -> ClockCheck:
-    """Return the comparison of the controller's clock that a run would have, with no difference from other clocks.
-
-    The other clocks are the computer's and, if `on_board`, the board's crystal.
-    """
+    """Return the clock comparison that a run would have if the controller's clock agreed with all other clocks."""
     stated = {
         COMPUTER_CLOCK: uncertainty.computer_clock_ppm,
         **({CRYSTAL_CLOCK: uncertainty.crystal_ppm} if on_board else {}),
@@ -172,10 +169,7 @@ def _average(timed: Timed[Step], run: PlannedRun, sensor: SensorSection) -> Aver
 
 
 def _plan_observation(timed: Timed[Sweep], run: PlannedRun, sensor: SensorSection, speed_std: float) -> Observation:
-    """Return the observation that a planned sweep would give; `speed_std` is relative to the speed.
-
-    Its mean reading is zero, but has the variance of the sensor's noise.
-    """
+    """Return the observation that a planned sweep would give, with zero mean; `speed_std` is relative to its speed."""
     sweep, turn = timed.step, predict_revolution(timed, run.arm, np.array(run.settings.mount))
     axis, sign = nearest_axis(mounting_matrix(sensor.mounting) @ turn.axis_flange)
     return Observation(

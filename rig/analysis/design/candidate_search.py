@@ -15,10 +15,7 @@ NO_BUDGETS: Mapping[str, Budget] = MappingProxyType({})
 
 @dataclass(frozen=True, slots=True)
 class ReachedUncertainty:
-    """The largest U of any axis and sensor: of scale and bias of gyroscopes, then of accelerometers.
-
-    The last two are 0 without accelerometers.
-    """
+    """The largest U of any axis and sensor: of gyroscopes, then of accelerometers; 0 without such sensors."""
 
     scale: float
     bias_rad_s: float

@@ -78,10 +78,7 @@ def plan_segments(run: PlannedRun) -> PlannedSegments:
 
 
 def _list_parts(plan: Plan, motion: ArmMotion) -> Iterator[_PlannedSegment]:
-    """Yield the segments of all sweeps, then of all rests.
-
-    The plan is divided as `rig.observation.consistency.segments` divides a recording.
-    """
+    """Yield the segments of sweeps, then rests, as `rig.observation.consistency.segments` divides a recording."""
     parts, parts_of_rest = segment_counts(len(plan.sweeps))
     for index, sweep in enumerate(time_steps_of(plan, Sweep)):
         yield from _cut_window(motion, sweep.window_s, index, parts)

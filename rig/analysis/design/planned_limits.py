@@ -78,10 +78,7 @@ def _gyroscope_limits(
     *,
     by_arm: bool,
 ) -> tuple[DetectionLimit, ...]:
-    """Return the detection limits of one gyroscope, from the plan's segments with the data sheet's noise.
-
-    `by_arm`: whether an arm turns the sensor, whose states have jitter and noise.
-    """
+    """Return the detection limits of one gyroscope, from the plan's segments with the data sheet's noise."""
     matrix, full_scale_rad_s = mounting_matrix(sensor.mounting), float(np.radians(sensor.range_deg_s))
     readings = segments.read_with(matrix, PARTS[sensor.part].angle_random_walk_rad_sqrt_s, sensor.rate_hz)
     times_s = readings.segments.times_s.mean(axis=1)

@@ -95,10 +95,7 @@ def predict_state_jitter(plan: Plan) -> float:
 
 
 def predict_revolution(timed_step: Timed[Sweep], arm: DenavitHartenberg, mount: Array) -> Revolution:
-    """Return a planned sweep's revolution or arc, in the form in which `ArmMotion.turn` finds it in a recording.
-
-    `mount` (3, 3) takes vectors from the flange's frame into the item's.
-    """
+    """Return a planned sweep's revolution or arc, as `ArmMotion.turn` finds it, with a mount (3, 3) on the flange."""
     sweep, start_q_rad = timed_step.step, timed_step.step.first_q_rad
     return Revolution(
         *timed_step.window_s,
@@ -113,10 +110,7 @@ def predict_revolution(timed_step: Timed[Sweep], arm: DenavitHartenberg, mount: 
 
 
 def predict_attitude(timed_step: Timed[Step], arm: DenavitHartenberg, mount: Array) -> Array:
-    """Return the mean attitude (3, 3) of a planned revolution, rest or dwell, as `ArmMotion.attitude` would find it.
-
-    `mount` (3, 3) takes vectors from the flange's frame into the item's.
-    """
+    """Return the mean attitude (3, 3) of a planned revolution, rest or dwell, as `ArmMotion.attitude` finds it."""
     if not isinstance(timed_step.step, Sweep):
         return mount @ _attitude(timed_step.q_rad, arm)
     return mount @ _mean_attitude(

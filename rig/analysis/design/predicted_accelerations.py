@@ -25,10 +25,7 @@ from rig.motion.steps import Plan
 
 
 def predict_accelerometer_budgets(config: RigConfig, plan: Plan, arm: DenavitHartenberg) -> dict[str, Budget]:
-    """Return the predicted budget of each accelerometer on an `arm`, by sensor name; empty if none is calibrated.
-
-    Raise LinAlgError if the plan does not determine a calibration.
-    """
+    """Return the predicted budget of each accelerometer on an `arm`. Raise LinAlgError if the plan is insufficient."""
     if config.procedure.accelerometer_order == 0:
         return {}
     return {
@@ -60,10 +57,7 @@ def _budget(accelerometer: PlannedAccelerometer) -> Budget:
 
 
 def _new_fraction(stated: Uncertainty) -> float:
-    """Return the fraction of the attitude errors' variance that is independent in each dwell, by the stated errors.
-
-    It is limited to the range of `INDEPENDENT_FRACTIONS`.
-    """
+    """Return the stated fraction of the attitude errors' variance that is new in each dwell, within the valid range."""
     fraction = stated.repeatability_deg**2 / max(
         stated.repeatability_deg**2 + stated.axis_deg**2, np.finfo(np.float64).tiny
     )

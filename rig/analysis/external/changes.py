@@ -11,10 +11,7 @@ REMEDY = "Solve the parts before and after separately; look for a knock, or a ra
 
 
 def check_steady(change: AbruptChange | None, quantity: Quantity, least_evidence: float = CERTAIN_EVIDENCE) -> None:
-    """Raise Fault `bias_jumped` or `scale_changed` if a `change` is larger than U can cover.
-
-    A change with less evidence than `least_evidence` is not refused.
-    """
+    """Raise Fault `bias_jumped` or `scale_changed` if a change has enough evidence and is larger than U covers."""
     if change is None or change.evidence < least_evidence:
         return
     axis = int(np.argmax(np.abs(change.sizes)))

@@ -130,10 +130,7 @@ def _mean_rates(time_s: Array, total: Array, edges_s: Array, close: NDArray[np.b
 
 
 def _explain(rates: Array, readings: Array) -> tuple[float, Array]:
-    """Return the fraction of the variance of `rates` (n, 3) that a linear map of `readings` (n, 3) explains.
-
-    Also return the matrix (3, 3) of this map.
-    """
+    """Return the fraction of the variance of `rates` (n, 3) that a linear map of `readings` explains, and this map."""
     design = np.column_stack([readings, np.ones(len(readings))])
     fit = np.linalg.lstsq(design, rates, rcond=None)[0]
     residuals = rates - design @ fit

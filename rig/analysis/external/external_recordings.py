@@ -285,10 +285,7 @@ def _vector(data: ExternalData) -> VectorSolution:
 def _solve_attitudes(
     read: ExternalReadings, samples: Samples, settings: RunSettings, name: str | None
 ) -> ExternalResult:
-    """Return the solution of all quantities in known attitudes by the method `name`.
-
-    If `name` is None, a method is chosen for each quantity.
-    """
+    """Return the solution of all quantities in attitudes by the method `name`; if None, one is chosen for each."""
     method, site, options = find_method(name), settings.site, settings.elsewhere
     assert options is not None, "of readings of others"
     placed = average_placements(samples, read.motion, find_clock=options.find_clock)

@@ -53,10 +53,7 @@ def notes_on_reading(read: ExternalReadings, samples: Samples) -> Iterator[str]:
 
 
 def notes_on_speeds(data: ExternalData) -> Iterator[str]:
-    """Yield a note if speeds look like °/s.
-
-    If readings and speeds share a wrong unit, the scale factors are right, but the bias has this unit too.
-    """
+    """Yield a note if speeds look like °/s; if the readings are in °/s too, only the bias is wrong."""
     fastest = max((sweep.speed_rad_s for sweep in data.sweeps), default=0.0)
     remedy = "if both files are in °/s, state that unit with --columns, because the bias depends on it"
     if RATE.mistaken is not None and fastest > RATE.mistaken.unusual:
@@ -76,10 +73,7 @@ def notes_on_speeds(data: ExternalData) -> Iterator[str]:
 
 
 def notes_on_scale(scale: Array) -> Iterator[str]:
-    """Yield a note if all scale factors (3,) are far above 1, or all far below.
-
-    They are if half turns are stated as whole ones.
-    """
+    """Yield a note if all scale factors (3,) are far above 1 or far below, as if half turns were stated as whole."""
     if np.all(scale > UNUSUAL_SCALE_RATIO) or np.all(scale < 1 / UNUSUAL_SCALE_RATIO):
         yield (
             f"the scale factors are near {np.median(scale):.2g}, and those of readings in rad/s near 1: check the "

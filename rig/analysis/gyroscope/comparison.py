@@ -213,10 +213,7 @@ def _summarise_errors(errors: Sequence[Array]) -> Deviation:
 
 
 def _estimate_noise(rests: Sequence[Array]) -> Array | None:
-    """Return the standard deviation (3,) of the differences at rest about the mean of each rest.
-
-    Return None if no rest has enough samples.
-    """
+    """Return the standard deviation (3,) of errors about their mean in a rest; None if all rests are too short."""
     long_enough = [rest for rest in rests if len(rest) >= MIN_SAMPLES_AT_REST]
     if not long_enough:
         return None

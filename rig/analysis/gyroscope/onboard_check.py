@@ -53,10 +53,7 @@ class Agreement:
 
 
 def check_arithmetic(runs: Sequence[RunData], sensor: str) -> Agreement:
-    """Return the comparison of the board's and the host's solution for one sensor of a run.
-
-    The last of the recordings `runs` contains the board's solutions.
-    """
+    """Return how the board's solution for a sensor, in the last of the recordings `runs`, agrees with the host's."""
     solutions = {event.solution.method: event for event in _events(runs[-1], sensor) if isinstance(event, BoardSolved)}
     not_observed = _list_unobserved(runs[-1], sensor)
     host = _solve(_list_observations(runs, sensor))
@@ -116,10 +113,7 @@ def _list_observations(runs: Sequence[RunData], sensor: str) -> list[_BoardObser
 
 
 def _recall_observation(earlier: Sequence[RunData], recalled: BoardRecalled) -> _BoardObservation:
-    """Return an observation that the board stored earlier, from the newest recording that contains it.
-
-    Its values are NaN if no recording does.
-    """
+    """Return a recalled observation from the newest recording that contains it; its values are NaN if none does."""
     for run in reversed(earlier):
         if earlier_observations := find_board_averages([run], recalled.sensor, (recalled.sweep,)):
             return _average_observation(run, earlier_observations[recalled.sweep])

@@ -62,10 +62,7 @@ def collect_inputs(recordings: Sequence[ObservedRun], sensor: str, environment: 
 
 
 def combine_recordings(parts: Sequence[RecordingPart], environment: MeasurementEnvironment) -> VectorInputs:
-    """Return the inputs from all recordings of a run, first all revolutions, then all rests.
-
-    The sensor's properties are not set.
-    """
+    """Return the inputs from all recordings, first revolutions, then rests, without the sensor's properties."""
     site, extension_m = environment.site, np.array(environment.extension_m)
     turns = [turn for part in parts for turn in part.turns]
     averages, offsets_s = _list_averages(parts)

@@ -74,10 +74,7 @@ def verify(
 
 
 def _gravity_difference(gravity_rad_s: tuple[Array, Array] | None, rotation: Array) -> Array | None:
-    """Return gravity's effect (N, 3) on the difference of sensor and reference, in the sensor's frame.
-
-    Return None if gravity's effects were not estimated.
-    """
+    """Return gravity's effect (N, 3) on the difference of sensor and reference; None if it was not estimated."""
     if gravity_rad_s is None:
         return None
     on_sensor, on_reference = gravity_rad_s

@@ -23,10 +23,7 @@ WRIST_ERRORS, CONSTANTS = 6, 2  # the first two are a wrist's twist and zero, th
 
 @dataclass(frozen=True, slots=True)
 class Posture:
-    """The arm's joint angles (6,) in a dwell or at a sweep's start.
-
-    `wrist` (0 to 2) is the wrist that the sweep turns, None in a dwell.
-    """
+    """The arm's joint angles (6,) in a dwell or at a sweep's start; `wrist` (0 to 2): the one that the sweep turns."""
 
     q_rad: Array
     wrist: int | None = None
@@ -78,7 +75,7 @@ def _rotations(posture: Posture, arm: DenavitHartenberg, mounting: Array) -> Arr
     if posture.wrist is None:
         return in_flange.reshape(-1, OWN_ERRORS)
     # An error between base and turning wrist rotates the whole sweep in the base; an error beyond that wrist rotates it
-    # in the flange's frame. Waves of the turning wrist's own angle change the speed during the sweep instead.
+    # in the flange's frame. Waves of the turning wrist's own angle are errors of the angle swept.
     sizes = np.zeros((*in_base.shape[:2], SHARED_ERRORS))
     for wrist in range(len(in_base)):
         distal = wrist > posture.wrist
@@ -95,10 +92,7 @@ def _rotations(posture: Posture, arm: DenavitHartenberg, mounting: Array) -> Arr
 
 
 def _shift_harmonics(angle_rad: float) -> Array:
-    """Return the matrix (4, 4) that shifts the origin of a curve with two harmonics by `angle_rad`.
-
-    It maps the coefficients of the cosines and sines of θ − `angle_rad` to those of θ.
-    """
+    """Return the matrix (4, 4) that takes the coefficients of two harmonics of θ − `angle_rad` to those of θ."""
     cos, sin, cos_2, sin_2 = angle_waves(angle_rad)
     waves: Array = np.zeros((4, 4))
     waves[:2, :2] = [[cos, -sin], [sin, cos]]

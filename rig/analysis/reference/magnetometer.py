@@ -127,10 +127,7 @@ def _calibrate(
 
 
 def _drift(name: str, recordings: Sequence[ObservedRun], settings: RunSettings) -> FieldDrift | None:
-    """Return the field's change between measurements at the arm's home pose; None if there are fewer than two.
-
-    Raise Fault `field_drifts` if noise does not explain the change.
-    """
+    """Return the field's change between tests at the home pose, None without two tests. Raise Fault `field_drifts`."""
     tests = [test for run in recordings for test in field_tests(run, name, settings.observation, settings.home_q_rad)]
     if len(tests) < 2:
         return None
@@ -165,10 +162,7 @@ def _solve(solve: Callable[..., TriaxialSolution]) -> TriaxialSolution:
 def _attitude_error_rad(
     name: str, recordings: Sequence[ObservedRun], accelerometers: Mapping[str, AccelerometerResult]
 ) -> float:
-    """Return an upper bound of the arm's attitude error, two standard deviations above an accelerometer's estimate.
-
-    The accelerometer is the one that shares the magnetometer's clock, if there is one.
-    """
+    """Return an upper bound of the arm's attitude error: an accelerometer's estimate plus two standard deviations."""
     by = next((other for run in recordings if (other := find_companion(run, name)) in accelerometers), None)
     accelerometer = accelerometers[by] if by is not None else next(iter(accelerometers.values()))
     error = accelerometer.solution.attitude_error

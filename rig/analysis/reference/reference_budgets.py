@@ -68,10 +68,7 @@ def accelerometer_budget(
 def combine_errors(
     spread: FitUncertainty, theta: Array, movement: Movement, site: Site, lag_s: float, *, datasheet: Datasheet | None
 ) -> Budget:
-    """Return the budget of scale and bias from the uncertainty `spread` of a fit with the solution `theta` (22,).
-
-    Gravity, the filter's lag and, if there is a `datasheet`, the sensor's own errors are separate contributors.
-    """
+    """Return the budget of scale and bias from the uncertainty `spread` of a fit with the solution `theta` (22,)."""
     others = [_lag(spread, movement, lag_s)] if len(movement.sweeps.speeds_rad_s) else []
     if movement.sensor_errors is None or datasheet is None:
         return reference_budget(spread, _gravity(site), others)
@@ -152,10 +149,7 @@ def _field(site: Site, field_t: float) -> NormUncertainty:
 
 
 def lag_pattern(movement: Movement, lag_s: float) -> Array:
-    """Return the effect (1, 3 K) of a filter lag of `lag_s` on the readings.
-
-    The filter reduces the wave in a sweep by the fraction (speed × `lag_s`)²/2; dwells and means are unaffected.
-    """
+    """Return the effect (1, 3 K) of a filter lag, which reduces a sweep's wave by the fraction (speed × `lag_s`)²/2."""
     dwells, sweeps = movement.dwells, movement.sweeps
     smaller = sweeps.harmonics_m_s2 * np.square(sweeps.speeds_rad_s * lag_s)[:, None, None] / 2
     smaller[:, 0] = 0.0  # the mean is not reduced

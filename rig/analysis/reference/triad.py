@@ -55,10 +55,7 @@ def gravity_reference(site: Site) -> KnownNorm:
 
 
 def field_reference(site: Site, key: str) -> KnownNorm:
-    """Return the reference of a magnetometer: the stated size of the field at the site.
-
-    Raise Fault `field_strength_unknown` if it is not stated; the message names the option `key` that states it.
-    """
+    """Return the stated field at the site. Raise Fault `field_strength_unknown`, which names its option, `key`."""
     if site.magnetic_field_t is None:
         raise Fault(
             "field_strength_unknown",
@@ -70,10 +67,7 @@ def field_reference(site: Site, key: str) -> KnownNorm:
 
 
 def stack_dwells(dwells: Sequence[DwellReading | StaticReading], mounting: Array) -> Dwells:
-    """Return the mean readings and attitudes of dwells, in the axes of the nominal `mounting` (3, 3).
-
-    Mean attitudes are replaced by the nearest rotations.
-    """
+    """Return the means of dwells, with attitudes as rotations, in the axes of the nominal `mounting` (3, 3)."""
     return Dwells(
         np.array([dwell.reading.mean for dwell in dwells]),
         np.array([dwell.reading.variance for dwell in dwells]),

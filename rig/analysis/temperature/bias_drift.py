@@ -104,10 +104,7 @@ def estimate_bias_drifts(recordings: Sequence[ObservedRun], settings: RunSetting
 
 
 def _select_complete(means: Mapping[int, DwellMean], table: Sequence[Sequence[int]]) -> list[list[DwellMean]]:
-    """Return the dwells of each repeat whose dwells were all measured; a row of `table` lists a repeat's dwell indices.
-
-    Raise Fault `not_all_attitudes` if there are too few.
-    """
+    """Return the dwells of each complete repeat; rows of `table` list repeats. Raise Fault `not_all_attitudes`."""
     complete = [[means[index] for index in repeat] for repeat in table if means.keys() >= set(repeat)]
     if len(complete) < MIN_REPEATS:
         raise Fault(
