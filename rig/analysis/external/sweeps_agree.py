@@ -159,7 +159,7 @@ def _derivatives(design: Array, means: Array, variances: Array) -> Array:
 
 
 def _contradictions(stated: StatedMotion, sizes: MotionErrors, design: Array) -> Array:
-    """Return the difference (N, 3) of each row from the solution of all others; 0 if these `sizes` explain it.
+    """Return the difference (N, 3) of each row from the solution of all others; 0 if errors of these sizes explain it.
 
     One wrong row among many hardly increases the estimated sizes, so its difference counts in addition. With only two
     sweeps about an axis, neither differs enough, but a wrong one increases the sizes.
