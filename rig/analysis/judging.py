@@ -166,7 +166,7 @@ class _DwellOutcome:
 def _judge_dwells(
     recordings: tuple[ObservedRun, ...], settings: RunSettings, swept: _GyroscopeOutcome, *, drifting: bool
 ) -> _DwellOutcome:
-    """Return the part about accelerometers, aligned to the gyroscopes in `swept`, and about magnetometers."""
+    """Return the part of an outcome about accelerometers, aligned to the gyroscopes of `swept`, and magnetometers."""
     from rig.analysis.reference.accelerometer import calibrate_accelerometers
     from rig.analysis.reference.magnetometer import calibrate_magnetometers
 

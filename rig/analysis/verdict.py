@@ -51,7 +51,7 @@ class _LimitSet:
         return Check(name_check(self.sensor, self.quantity, what), value, limit, row.unit, means)
 
     def nearest(self, what: str, values: Array, uncertainty: ExpandedUncertainty | None) -> Check:
-        """Return the check of the axis with the largest magnitude of value plus guard by the decision rule."""
+        """Return the check of the worst of three axes: the one with the largest |value| plus guard."""
         check = self.check(what, _largest_magnitude(values))
         if uncertainty is None or check.value is None:
             return check

@@ -105,7 +105,7 @@ def _test_segments(
     settings: RunSettings,
     false_alarm_probability: float,
 ) -> tuple[Segments, TestResults]:
-    """Return the segments of a gyroscope's sweeps and rests, and the tests whether one model explains them all."""
+    """Return the segments of a gyroscope's sweeps and rests, and the tests of whether one model explains them all."""
     matrix, windows = explained.solution.matrix, segment_recordings(name, recordings)
     segments = stack_segments(windows, explained, settings.site)
     # All sweeps about one axis follow each other, so they do not show a change of that axis before or after them. The

@@ -11,5 +11,8 @@ CHECKS = (*gyroscope_checks.CHECKS, DISTURBED_SWEEP, *converter_tests.CHECKS, NO
 
 
 def false_alarm_per_check(kinds: int, *, of_all: float = FALSE_ALARM_PROBABILITY) -> float:
-    """Return the false-alarm probability of each check, if the checks of all `kinds` of readings share `of_all`."""
+    """Return the false-alarm probability of one check, if all checks together have the probability `of_all`.
+
+    `kinds` is the number of kinds of readings, such as the rates of one gyroscope, each of which has as many checks.
+    """
     return false_alarm_of_each(of_all, len(CHECKS) * kinds)

@@ -188,7 +188,7 @@ def _free_disturbed_transfers(
     bias: BiasProcess,
     false_alarm_probability: float,
 ) -> tuple[_TestedSegments, Statistic | None]:
-    """Return the segments with transfers, of which outlying ones have a mean of their own, and the axis test.
+    """Return the segments with transfers, in a model in which outlying transfers have own means, and the axis test.
 
     The axis test is the statistic of a change of one axis's scale factor, None if the model contains such a change. A
     ripple at the data rate shifts the mean of one transfer, a change of the sensor those of all later transfers. So a

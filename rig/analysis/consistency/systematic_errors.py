@@ -303,7 +303,7 @@ def _wave_indices(motion: ArmMotion) -> dict[int, int]:
 
 
 def _end_patterns(interval: MotionInterval) -> list[Array]:
-    """Return the errors (3,) of a transfer's mean rate per radian of angle error, of each moved joint at each end."""
+    """Return a transfer's rate errors (3,), rad/s, per radian of angle error of each moved joint at either end."""
     q_rad = interval.motion.angles(np.array([interval.start_s, interval.end_s]))
     axes = interval.motion.axes(q_rad) / (interval.end_s - interval.start_s)
     moved = [joint for joint in _wave_indices(interval.motion) if np.ptp(q_rad[:, joint]) >= STILL_RAD]

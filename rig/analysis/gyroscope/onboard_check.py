@@ -113,7 +113,7 @@ def _list_observations(runs: Sequence[RunData], sensor: str) -> list[_BoardObser
 
 
 def _recall_observation(earlier: Sequence[RunData], recalled: BoardRecalled) -> _BoardObservation:
-    """Return a recalled observation from the newest recording that contains it; its values are NaN if none does."""
+    """Return an observation that the board recalled, from the newest recording that contains it; NaN if none does."""
     for run in reversed(earlier):
         if earlier_observations := find_board_averages([run], recalled.sensor, (recalled.sweep,)):
             return _average_observation(run, earlier_observations[recalled.sweep])

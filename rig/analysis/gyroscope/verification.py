@@ -24,8 +24,8 @@ class Verification:
 
     - `reference_error_rad_s`: the largest error of the magnitude of the reference's mean rate in a revolution or rest;
       the arm shows the true rate.
-    - `rotation`: that from the reference to the sensor.
-    - `before`: of uncalibrated readings, None if not recorded; `after`: of calibrated readings.
+    - `rotation`: the rotation from the reference's frame into the sensor's.
+    - `before`: the comparison of uncalibrated readings, None if not recorded; `after`: that of calibrated readings.
     """
 
     sensor: str

@@ -35,7 +35,8 @@ class StatedArm:
 
     - `arm`: the kinematics; `axis_deg`: the stated half-width of the errors of its angles.
     - `mounting` (3, 3): the nominal mounting of the sensor on the flange.
-    - `estimated_rad`: the standard deviation of these errors as estimated from the readings, used if it is larger.
+    - `estimated_rad`: the standard deviation of the wrists' errors, estimated from the readings; if it is larger than
+      the stated one, it replaces that.
     """
 
     arm: DenavitHartenberg

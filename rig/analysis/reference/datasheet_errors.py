@@ -43,7 +43,7 @@ MICRO_G_PER_MILLI_G = 1000
 
 @dataclass(frozen=True, slots=True)
 class Datasheet:
-    """The errors of an accelerometer in its data sheet, as half-widths.
+    """The errors of an accelerometer in its data sheet: half-widths, and an Allan deviation.
 
     - nonlinearity_percent: nonlinearity from −`over_g` to `over_g`, in % of `over_g`.
     - bias_mg_k, scale_ppm_k: the temperature coefficients of bias and scale.
@@ -94,9 +94,8 @@ def read_datasheet(uncertainty: Uncertainty, name: str, range_m_s2: float) -> Da
 class ReferenceWindow:
     """A dwell or a sweep, with the arm's `posture`.
 
-    - `number`: its index in the plan.
-    - `window_s`: start and end on the clock of the first recording.
-    - `temperature_c`: the mean temperature of the sensor over the window's `samples`, which are a number.
+    - `number`: its index in the plan; `window_s`: its start and end on the clock of the first recording.
+    - `samples`: the number of its samples; `temperature_c`: the sensor's mean temperature over them.
     """
 
     number: int

@@ -36,7 +36,7 @@ class MagnetometerResult:
 
     - field_t: the size of the field.
     - extension_m (3,): the sensor's position relative to the flange, in the flange's frame.
-    - uniformity: the test whether the field is the same in all attitudes.
+    - uniformity: the test of whether the field is the same in all attitudes.
     - drift: the change of the field between measurements at the home pose, None if there were fewer than two.
     - triad: scale, relative to `field_t`, and axes, with the uncertainty of the solution alone.
     - budget: the uncertainty of scale and bias from all causes.
@@ -62,10 +62,9 @@ def calibrate_magnetometers(
 ) -> Attempts[str, MagnetometerResult]:
     """Return the calibration of every recorded magnetometer, or its Fault.
 
-    The solutions of `accelerometers` show how large the error of the arm's attitudes may be. The Faults are
-    `no_attitudes` without dwells,
-    `field_strength_unknown`, `field_drifts`, `field_not_uniform`, `swapped_axes`, `mirrored_axis`, `wrong_mounting`,
-    and those of `field_readings` and `solve_triaxial`.
+    The `accelerometers` show how large the error of the arm's attitudes may be. The Faults are `no_attitudes` without
+    dwells, `field_strength_unknown`, `field_drifts`, `field_not_uniform`, `swapped_axes`, `mirrored_axis`,
+    `wrong_mounting`, and those of `field_readings` and `solve_triaxial`.
     """
     magnetometers = recordings[0].run.measuring(FIELD)
     return attempt_each(

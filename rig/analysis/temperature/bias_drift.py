@@ -206,9 +206,9 @@ def _combine(
     *,
     earth_rate_known: bool,
 ) -> BiasDrift:
-    """Return the drift from biases with a fixed scale (`by_repeat`), which determine the slope over temperature.
+    """Return the drift from `by_repeat`, the biases with a fixed scale, and from a separate solution of each repeat.
 
-    Biases by a separate solution of each repeat, by `solve`, are added.
+    `solve` returns the latter. The slope over temperature is that of the biases with a fixed scale.
     """
     times = np.array([np.mean([mean.time_s for mean in repeat]) for repeat in repeats], dtype=np.float64)
     temperatures = np.array([np.mean([mean.temperature_c for mean in repeat]) for repeat in repeats], dtype=np.float64)

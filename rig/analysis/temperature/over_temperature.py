@@ -92,7 +92,7 @@ def correct_files(data: ExternalData, reference_c: float) -> tuple[ExternalData,
 
 
 def add_rate_polynomials(result: SensorResult, polynomials: OverTemperature) -> tuple[SensorResult, OverTemperature]:
-    """Return a gyroscope's calibration and polynomials; the uncertainty of each now includes that of the other."""
+    """Return a gyroscope's calibration and polynomials; the uncertainty of each includes that of the other."""
     parameters = np.r_[result.scale, result.bias_rad_s]
     if result.uncertainty is None:
         return result, combine_with_reference(polynomials, np.diag(RATE.parameter_signs) @ parameters, ())
@@ -103,7 +103,7 @@ def add_rate_polynomials(result: SensorResult, polynomials: OverTemperature) -> 
 def add_acceleration_polynomials(
     result: AccelerometerResult, polynomials: OverTemperature
 ) -> tuple[AccelerometerResult, OverTemperature]:
-    """Return an accelerometer's calibration and polynomials; the uncertainty of each now includes that of the other."""
+    """Return an accelerometer's calibration and polynomials; the uncertainty of each includes that of the other."""
     budget, combined = _combine(ACCELERATION, polynomials, np.r_[result.triad.scale, result.bias_m_s2], result.budget)
     return replace(result, budget=budget), combined
 
@@ -111,7 +111,7 @@ def add_acceleration_polynomials(
 def _combine(
     quantity: Quantity, polynomials: OverTemperature, parameters: Array, budget: Budget
 ) -> tuple[Budget, OverTemperature]:
-    """Return the budget with the fit of the polynomials as a contributor, and the polynomials with all contributors.
+    """Return the budget and the polynomials, after the uncertainty of each is added to the other.
 
     `parameters` (6,) are scale and bias at the reference temperature.
     """
