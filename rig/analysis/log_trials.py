@@ -65,7 +65,7 @@ def try_attitudes(
 
 
 def _find_obstacle(files: Files, request: SolveOptions, up: str) -> str | None:
-    """Return why the files have no solution with the axis `up` upwards, or which checks fail; None if all pass."""
+    """Return why the files have no solution, if the axis `up` points upwards, or which checks fail; None if none."""
     x, y, z = axis_of(up).tolist()
     site = Site(up=(x, y, z), gravity_m_s2=STANDARD_GRAVITY_M_S2, earth_rate_rad_s=None)
     try:

@@ -236,7 +236,7 @@ def _inflate_transfers(
 def _residual_chi_square(tested: _TestedSegments) -> tuple[float, int]:
     """Return the residuals' χ² after a fit of the model and of all tested changes, and its degrees of freedom.
 
-    Changes that the model contains, except for the rates' noise, are not fitted; without transfers there are some.
+    Changes that differ from the model only by the noise of the rates are not fitted; without transfers there are some.
     """
     changed = [*changes(tested.segments, tested.axis_rates).values(), quarter_columns(tested.means)]
     columns = [apply_whitener(tested.model.whitener, change) for change in changed]
@@ -361,7 +361,7 @@ def _estimate_bias_process(
 
 
 def _build_scatter(segments: Segments, patterns_rad_s: Array, allowance: ErrorPatterns) -> Scatter:
-    """Return the errors of the means due to noise and to the known errors of arm and sensor."""
+    """Return the errors of the segments' means: noise, and the known errors of arm and sensor (`patterns_rad_s`)."""
     return Scatter(segments.variances_rad2_s2, patterns_rad_s, allowance.instability_rad_s)
 
 

@@ -45,7 +45,7 @@ class ReferenceModel:
 
 
 def alternatives(model: ReferenceModel) -> Alternatives:
-    """Return the effects (3 K, k) of each possible fault, by its check's name; None is for all residuals."""
+    """Return the effects (3 K, k) of each possible fault, by its check's name; None stands for all residuals."""
     s, f, time = find_force(model.theta, model.movement), matrix(model.theta), _time(model)
     columns: dict[str, Array | None] = {
         "bias_changed": bias_drift_columns(model),

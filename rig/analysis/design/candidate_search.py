@@ -97,7 +97,7 @@ class Candidate:
     rests_s: tuple[float, ...] = ()
 
     def is_contained_in(self, other: "Candidate") -> bool:
-        """Return whether the `other` has the same rests and no smaller sizes, so that its U is not larger."""
+        """Return whether the `other` differs at most by larger sizes, so that its U is not larger."""
         return (self.family, self.rests_s) == (other.family, other.rests_s) and all(
             size <= other_size for size, other_size in zip(self.sizes, other.sizes, strict=True)
         )

@@ -25,7 +25,7 @@ from rig.motion.steps import Plan, Rest
 
 @dataclass(frozen=True, slots=True)
 class DetectionLimits:
-    """The detection limits by sensor: of gyroscopes with sweeps, of accelerometers with attitudes."""
+    """The detection limits of gyroscopes, from sweeps (`rates`), and of accelerometers, from attitudes, by sensor."""
 
     rates: Mapping[str, tuple[DetectionLimit, ...]]
     accelerations: Mapping[str, tuple[DetectionLimit, ...]]

@@ -102,7 +102,7 @@ class Equations:
         )
 
     def solve_others(self, method: Method, *others: Method) -> Attempts[Method, TriaxialSolution]:
-        """Return the solution by each of the `others`, without `method`, or the Fault if there is no solution."""
+        """Return the solution by each of the `others` that is not `method`, or the Fault if there is no solution."""
         return attempt_each({other: partial(self.solve, other) for other in others if other != method})
 
 
@@ -110,7 +110,7 @@ def _estimate_variances(rows: Rows, reference: KnownVector) -> tuple[Array, Arra
     """Return the variances (N, 3) of the means, and the degrees of freedom (N, 3) of these variances.
 
     All samples of an axis have one variance, which follows from the residuals of a fit without attitude errors. Raise
-    Fault `too_few_observations` if there are no more rows than parameters require.
+    Fault `too_few_observations` if there are too few rows to determine it.
     """
     counts = rows.samples[:, None]
     quiet = np.full_like(rows.means, (1e-9 * np.abs(rows.means).max()) ** 2) / counts

@@ -72,7 +72,7 @@ class ExternalResult:
     """The solution of an external recording.
 
     - item: the sensor.
-    - gyroscope: its calibration, None without one.
+    - gyroscope: the calibration of the gyroscope, None without a gyroscope.
     - rates: the gyroscope's solution in attitudes, None if it was solved from sweeps.
     - at_rest: the solutions of the other quantities, from rests.
     - unsolved: for each recorded quantity without a solution, the Fault that says why.

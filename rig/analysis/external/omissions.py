@@ -98,7 +98,7 @@ def notes_on_changes(data: ExternalData) -> Iterator[str]:
 
 
 def notes_on_turns(data: ExternalData, solution: Estimate) -> Iterator[str]:
-    """Yield a note if turns with a stated angle were solved from their mean speed, as they do not start at rest."""
+    """Yield a note if turns with an angle were solved from their mean speed, because they do not lie between rests."""
     if not data.by_mean:
         return
     why = (

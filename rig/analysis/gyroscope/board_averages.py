@@ -16,9 +16,9 @@ LIMIT = 6.0  # standard deviations of the mean: the two averages share its noise
 def board_averages(sensor: str, recordings: Sequence[ObservedRun]) -> tuple[Check, ...]:
     """Return a check for each sweep in which the averages of board and computer disagree.
 
-    If they agree in all sweeps, return a single check for the largest difference.
-    A check's value is the difference of the two averages on the worst axis, in standard deviations of the computer's
-    average. If the board averaged nothing, there are no checks.
+    If they agree in all sweeps, return a single check for the largest difference. A check's value is the difference of
+    the two averages on the worst axis, in standard deviations of the computer's average. If the board averaged nothing,
+    there are no checks.
     """
     deviations = compare_board_means(sensor, recordings)
     if not deviations:

@@ -128,9 +128,8 @@ def describe_sensor(
 def lever_arms_m(turns: Sequence[Observation], extension_m: Array, mount: Array | None = None) -> Array:
     """Return the lever arms (M, 3) from the axis of rotation to the sensors in M sweeps, in the item's frame.
 
-    They are zero if no robot turned the item.
-    `extension_m` (3,): from the flange to the sensors, in the flange's frame. `mount` (3, 3): rotation from the
-    flange's frame to the item's; None if they agree.
+    They are zero if no robot turned the item. `extension_m` (3,): from the flange to the sensors, in the flange's
+    frame. `mount` (3, 3): rotation from the flange's frame to the item's; None if they agree.
     """
     mounted_m = extension_m if mount is None else mount @ extension_m
     lever_arms = [turn.arm_m + mounted_m if turn.arm_m is not None else np.zeros(3) for turn in turns]

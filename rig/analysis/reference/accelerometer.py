@@ -122,9 +122,8 @@ def calibrate_accelerometers(
 ) -> dict[str, AccelerometerResult]:
     """Return the calibration of each sensor's accelerometer, with its alignment to the gyroscope, by sensor name.
 
-    Return nothing if no dwells are planned.
-    Raise Fault `not_all_attitudes`, `second_order_not_seen`, `swapped_axes`, `mirrored_axis`, `wrong_mounting`, and
-    what `solve_imu` and `solve_triaxial` raise.
+    It is empty if no dwells are planned. Raise Fault `not_all_attitudes`, `second_order_not_seen`, `swapped_axes`,
+    `mirrored_axis`, `wrong_mounting`, and what `solve_imu` and `solve_triaxial` raise.
     """
     if not settings.planned_dwells:
         return Attempts()

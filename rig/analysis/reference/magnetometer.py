@@ -1,7 +1,7 @@
 """The calibration of magnetometers on an arm, from dwells in known attitudes: Eq. (7) of the paper TRIAX.
 
-The bias contains the field of iron and currents that turn with the magnetometer, also in the arm, which no residual
-shows. Runs with the sensor turned over separate this field (`rig.analysis.reversal`).
+Iron and currents that turn with the magnetometer, also in the arm, cause a field that is part of the bias, and that no
+residual shows. Runs with the sensor turned over between them separate the arm's field (`rig.analysis.reversal`).
 """
 
 from collections.abc import Callable, Mapping, Sequence

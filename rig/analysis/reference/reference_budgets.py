@@ -85,7 +85,7 @@ def magnetometer_budget(
     field_t: float,
     noise_dof: Array,
 ) -> Budget:
-    """Return the budget of a magnetometer's solution of measurements in tesla."""
+    """Return the budget of a magnetometer's `solution`; `tested` are the tests of the field's uniformity and drift."""
     homogeneity, drift = tested
     spread = _propagate(
         solution,
@@ -107,10 +107,11 @@ def _propagate(
     *,
     noise_dof: Array,
 ) -> FitUncertainty:
-    """Return the uncertainty of scale and bias, from the `response` (p, n) of all parameters to the readings.
+    """Return the uncertainty of scale and bias from that of all parameters.
 
-    `noise` (n, n): the readings' covariance; `error`: the attitude error; `chi_square`: χ² of the residuals, and the
-    degrees of freedom of this χ².
+    - `response` (p, n): the derivatives of p parameters with respect to n readings.
+    - `noise` (n, n): the covariance of the readings; `error`: the arm's attitude error.
+    - `chi_square`: the χ² of the residuals, and its degrees of freedom.
     """
     scale = scale_of(solution.matrix)
     rows = scale_and_bias(solution.matrix, scale, len(solution.covariance))

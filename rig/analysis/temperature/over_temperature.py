@@ -52,8 +52,8 @@ class CorrectedRuns:
 def correct_recordings(recordings: Sequence[ObservedRun], settings: RunSettings, reference_c: float) -> CorrectedRuns:
     """Return the recordings with the means of sensors to calibrate corrected to the temperature `reference_c`.
 
-    The means are those of gyroscopes in sweeps and rests, and of accelerometers in dwells and sweeps.
-    Raise Fault `temperature_not_recorded`, and what `fit_over_temperature` raises.
+    The means are those of gyroscopes in sweeps and rests, and of accelerometers in dwells and sweeps. Raise Fault
+    `temperature_not_recorded`, and what `fit_over_temperature` raises.
     """
     environment = find_environment(recordings, settings)
     runs, polynomials = list(recordings), dict[str, dict[Quantity, OverTemperature]]()
