@@ -119,10 +119,10 @@ class AccelerometerResult:
 
 def calibrate_accelerometers(
     recordings: Sequence[ObservedRun], settings: RunSettings, gyroscopes: Mapping[str, SensorResult] = NO_GYROSCOPES
-) -> dict[str, AccelerometerResult]:
+) -> Attempts[str, AccelerometerResult]:
     """Return the calibration of each sensor's accelerometer, with its alignment to the gyroscope, by sensor name.
 
-    It is empty if no dwells are planned. Raise Fault `not_all_attitudes`, `second_order_not_seen`, `swapped_axes`,
+    It is empty if no dwells are planned. The Faults are `not_all_attitudes`, `second_order_not_seen`, `swapped_axes`,
     `mirrored_axis`, `wrong_mounting`, and what `solve_imu` and `solve_triaxial` raise.
     """
     if not settings.planned_dwells:

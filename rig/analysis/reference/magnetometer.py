@@ -63,8 +63,8 @@ def calibrate_magnetometers(
     """Return the calibration of every recorded magnetometer, or its Fault.
 
     The `accelerometers` show how large the error of the arm's attitudes may be. The Faults are `no_attitudes` without
-    dwells, `field_strength_unknown`, `field_drifts`, `field_not_uniform`, `swapped_axes`, `mirrored_axis`,
-    `wrong_mounting`, and those of `field_readings` and `solve_triaxial`.
+    dwells, `field_strength_unknown`, `field_drifts`, `field_not_uniform`, `attitude_untrustworthy`, `swapped_axes`,
+    `mirrored_axis`, `wrong_mounting`, and those of `field_readings` and `solve_triaxial`.
     """
     magnetometers = recordings[0].run.measuring(FIELD)
     return attempt_each(
@@ -161,7 +161,16 @@ def _solve(solve: Callable[..., TriaxialSolution]) -> TriaxialSolution:
 def _attitude_error_rad(
     name: str, recordings: Sequence[ObservedRun], accelerometers: Mapping[str, AccelerometerResult]
 ) -> float:
-    """Return an upper bound of the arm's attitude error: an accelerometer's estimate plus two standard deviations."""
+    """Return an upper bound of the arm's attitude error: an accelerometer's estimate plus two standard deviations.
+
+    Raise Fault `attitude_untrustworthy` if no accelerometer has a solution.
+    """
+    if not accelerometers:
+        raise Fault(
+            "attitude_untrustworthy",
+            "no accelerometer has a solution, which would show how exact the arm's attitudes are",
+            "Correct what prevents the accelerometer's solution, then run again",
+        )
     by = next((other for run in recordings if (other := find_companion(run, name)) in accelerometers), None)
     accelerometer = accelerometers[by] if by is not None else next(iter(accelerometers.values()))
     error = accelerometer.solution.attitude_error
