@@ -53,7 +53,7 @@ def placements_on_arm(
 def _average_dwell(
     recording: ObservedRun, name: str, quantity: Quantity, dwell: FinishedDwell, thresholds: ObservationThresholds
 ) -> Mean:
-    """Return the mean of a dwell. Raise Fault `saturation`, and what `check_complete` raises."""
+    """Return a sensor's mean reading in a dwell. Raise Fault `saturation`, and any Fault of `check_complete`."""
     where = f"dwell {dwell.dwell.index} ({dwell.dwell.name}) of {name}"
     channel, time_s = recording.run.sensors[name].channel(quantity), recording.time_s(name)
     samples = recording.run.samples[name][inside(time_s, dwell.window)]

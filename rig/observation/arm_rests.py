@@ -22,10 +22,10 @@ MIN_RESTS = 3  # fewest rests that show a drift of the bias
 def average_rests(
     run: RunData, stream: Stream, motion: ArmMotion, response: Array, superseded: Collection[int] = ()
 ) -> tuple[Average, ...]:
-    """Return the averages of the arm's sufficiently long rests, except rests next to a step in `superseded`.
+    """Return the averages of the arm's sufficiently long rests, except those next to a superseded sweep or dwell.
 
-    `superseded` are the sweeps and dwells that a later recording repeats. A resting arm still oscillates; `response`
-    (3, 3) converts the rates of this oscillation to readings, which are subtracted.
+    `superseded` are the indices of the sweeps and dwells that a later recording repeats. A resting arm still
+    oscillates. This effect is subtracted from the readings: `response` (3, 3) converts the flange's rates to readings.
     """
     rests = (_average_rest(stream, motion, window, response) for window in iterate_rests(run, superseded))
     return tuple(rest for rest in rests if rest is not None)
@@ -39,7 +39,7 @@ def trim_rest(motion: ArmMotion, rest: Window) -> Window | None:
 
 
 def still_samples(run: RunData, stream: Stream, motion: ArmMotion) -> Iterator[slice]:
-    """Yield the samples of every rest and dwell of the arm, split at each missing sample."""
+    """Yield slices of the samples in the arm's rests and dwells; missing samples divide a rest into several slices."""
     for window in iterate_rests(run):
         still = trim_rest(motion, window)
         if still is None:
@@ -57,9 +57,10 @@ def add_attitude(average: Average, motion: ArmMotion) -> Average:
 
 
 def estimate_bias_drift(rests: Sequence[Average]) -> Array:
-    """Return the variance (3,) of the rests' means due to bias drift, (rad/s)², which the noise does not explain.
+    """Return the variance (3,), (rad/s)², of the bias from rest to rest: the means' scatter minus their noise.
 
-    The result is zero unless χ² over all axes is significant at 0.999, so that noise does not count as drift.
+    The result is zero unless χ² of the scatter over all axes exceeds its 99.9 % quantile, so that noise does not count
+    as drift.
     """
     from scipy.special import chdtri
 

@@ -73,9 +73,13 @@ class Average:
 
 @dataclass(frozen=True, slots=True)
 class Stream:
-    """A sensor's n samples in physical units, on the controller's clock.
+    """A sensor's n samples: its rates in physical units, and their times on the controller's clock.
 
-    `steps` is the resolution of the recorded rates; `polynomials`, if any, correct readings to one temperature.
+    - time_s (n,): the times on the controller's clock, which `clock` converts from board_time_s (n,).
+    - readings_rad_s (n, 3): the rates, corrected to one temperature if there are `polynomials` of the rate.
+    - raw (n,): the samples as recorded.
+    - polynomials: by quantity, the dependence of readings on temperature that is removed from them; empty if none is.
+    - steps: the resolution of the recorded rates.
     """
 
     sensor: RecordedSensor
@@ -93,14 +97,17 @@ class Stream:
         return replace(stream, readings_rad_s=stream.correct_temperature(RATE, self.readings_rad_s, slice(None)))
 
     def correct_temperature(self, quantity: Quantity, readings: Array, inside: slice) -> Array:
-        """Return readings (n, 3) of the samples `inside`, at the reference temperature if there are polynomials."""
+        """Return a quantity's `readings` (n, 3), taken in the slice `inside`, corrected to the reference temperature.
+
+        Without polynomials of this quantity, the readings are returned unchanged.
+        """
         if quantity not in self.polynomials:
             return readings
         warm = self.sensor.channel(TEMPERATURE).values(self.raw[inside])
         return self.polynomials[quantity].correct_to_reference(readings, warm)
 
     def temperature_c(self, inside: slice) -> float:
-        """Return the mean temperature of the samples `inside`; NaN if nothing measures the sensor's temperature."""
+        """Return the mean temperature in the slice `inside`; NaN if nothing measures the sensor's temperature."""
         if not self.sensor.measures(TEMPERATURE):
             return float("nan")
         thermometer = self.sensor.channel(TEMPERATURE)
@@ -143,7 +150,7 @@ def slice_time(stream: Stream, start_s: float, end_s: float) -> slice:
 
 
 def build_average(stream: Stream, inside: slice, window: Window, mean: Mean) -> Average:
-    """Return the `mean` of the samples `inside` as an average over `window`, with their temperature."""
+    """Return an `Average` over `window` from the `mean` of the samples in the slice `inside`, and their temperature."""
     return Average(
         mean_rad_s=mean.mean,
         variance_rad2_s2=mean.variance,

@@ -55,7 +55,10 @@ def check_possible(readings: Array, rows: NDArray[np.intp], quantity: Quantity, 
 
 
 def check_temperatures(temperature_c: Array, rows: NDArray[np.intp], where: str) -> None:
-    """Raise Refused `wrong_unit` for a temperature too low or high for a laboratory; see also `check_possible`."""
+    """Raise Refused `wrong_unit` for a temperature too low or high for a laboratory.
+
+    `rows` (n,) are the readings' numbers in the file, from 0; messages call the file `where`.
+    """
     wrong = np.flatnonzero((temperature_c < MIN_TEMPERATURE_C) | (temperature_c > MAX_TEMPERATURE_C))
     if len(wrong):
         raise Refused(
@@ -69,8 +72,8 @@ def check_temperatures(temperature_c: Array, rows: NDArray[np.intp], where: str)
 def check_unwrapped(time_s: Array, readings: Array, rows: NDArray[np.intp], quantity: Quantity, where: str) -> None:
     """Raise Refused `readings_overflow` if an axis of readings (n, 3) jumps from one end of its span to the other.
 
-    Such jumps are overflows: a signed 16-bit number continues after 32767 at −32768. The other arguments are those of
-    `check_possible`.
+    Such jumps are overflows: a signed 16-bit number continues after 32767 at −32768. `rows` (n,) are the readings'
+    numbers in the file, from 0; messages call the file `where`.
     """
     if quantity not in MIN_SPAN or len(readings) < 2:
         return
@@ -94,7 +97,7 @@ def _find_overflows(time_s: Array, axis: Array, narrowest: float) -> NDArray[np.
 
     A change of sign between two joined recordings looks similar. But before an overflow the readings rise towards one
     end of the range. After it they rise on from the other end, or soon jump back, because noise makes a number at the
-    limit overflow in both directions.
+    limit overflow in both directions. No overflow is sought in readings that span less than `narrowest`.
     """
     none = np.zeros(0, dtype=np.intp)
     span, steps, steps_s = float(np.ptp(axis)), np.diff(axis), np.diff(time_s)
@@ -116,9 +119,10 @@ def _find_overflows(time_s: Array, axis: Array, narrowest: float) -> NDArray[np.
 
 
 def find_clipped(readings: Array) -> NDArray[np.bool_]:
-    """Return a mask of the readings (n,) that repeat the largest or smallest value of their axis several times.
+    """Return a mask (n,) of the readings that repeat the largest or smallest value of an axis several times.
 
-    A sensor at rest repeats values too, but its largest and smallest ones are close together.
+    A sensor at rest repeats these values too. So axes whose readings span less than `MIN_CLIPPED_RANGE_RAD_S` are
+    ignored.
     """
     clipped = np.zeros(len(readings), dtype=np.bool_)
     for axis in readings.T:
@@ -131,9 +135,9 @@ def find_clipped(readings: Array) -> NDArray[np.bool_]:
 
 
 def check_unclipped(time_s: Array, readings: Array, windows: list[Window]) -> None:
-    """Raise Fault `saturation` if rates (n, 3) in a window are at the end of their range.
+    """Raise Fault `saturation` if rates (n, 3) in one of the windows are at the end of their range.
 
-    An axis with steps as coarse as its noise repeats its largest reading anyway, and is not judged.
+    An axis with steps as coarse as its noise is not checked, because it repeats its largest reading anyway.
     """
     for axis, letter in enumerate(RATE.axes):
         column = readings[:, axis]

@@ -32,7 +32,7 @@ class LogSurvey:
 
     - rests: windows in which the body lay still.
     - turns: from rest to rest, in the order of time.
-    - at_rest: by quantity, the median over the rests of the norm of the mean reading.
+    - at_rest: by quantity, the norm of the mean reading at rest, as the median over the rests.
     - largest: by quantity, the largest absolute reading of any axis.
     - faces: the number of directions of gravity at rest more than 45° apart.
     """
@@ -71,7 +71,10 @@ def survey_log(samples: Samples) -> LogSurvey:
 
 
 def _find_turns(time_s: Array, rates: Array, rests: Sequence[Window]) -> Iterator[SurveyedTurn]:
-    """Yield the turns between adjacent rests: the integral of the rates minus the mean reading in the two rests."""
+    """Yield the turn between any two adjacent rests, unless it is too small.
+
+    It is the integral of the rates minus the bias, which is the mean reading in the two rests.
+    """
     for before, after in pairwise(rests):
         bias = np.mean([rates[inside(time_s, rest)].mean(axis=0) for rest in (before, after)], axis=0)
         window = Window(before.end_s, after.start_s)

@@ -27,8 +27,8 @@ PORT_REMEDIES: Mapping[str, str] = MappingProxyType(
 def lost_samples(sensor: RecordedSensor, samples: NDArray[Any], where: str, what: str, then: str) -> Fault:
     """Return the Fault `lost_samples` for samples (n,) of a sensor.
 
-    `where` and `what` state what is missing, `then` the remedy. If only every k-th sample is present, the message says
-    that the source sent fewer and the link lost none.
+    `where` names the part of the recording, `what` says what is missing in it, and `then` is the last part of the
+    remedy. If only every k-th sample is present, the message says so.
     """
     steps = np.diff(samples["sequence"].astype(np.int64))
     stride = int(np.median(steps)) if len(steps) else 1

@@ -46,11 +46,11 @@ MISREADING_FAULTS = {"wrong_axis", "wrong_sign", "wrong_unit"}  # a stuck sensor
 class Observation:
     """One revolution, or one arc of a joint, averaged.
 
-    - sweep: index of the sweep in the plan, in external data the row's number, from 1.
-    - joint_name, direction: of the joint's turn, None in external data.
+    - sweep: index of the sweep in the plan; in external data the number, from 1, of the row.
+    - joint_name: the joint that turned; direction: the direction of its turn. Both are None in external data.
     - axis ("x", "y", "z"), sign: the sensor axis that is nominally along the turn.
-    - axis_flange (3,), speed_rad_s: direction, in the flange's frame, and size of the arm's mean rate, which is
-      weighted like the mean reading; the size is nominally 2π/T or Δθ/T.
+    - axis_flange (3,): direction, in the flange's frame, of the arm's mean rate, which is weighted like the mean
+      reading; speed_rad_s: the size of this rate.
     - speed_std_rad_s: standard deviation of the speed, because the turn's ends lie between the arm's states.
     - lost: number of samples missing from the average.
     - axis_errors (13, 3): change of the axis per radian of each of the arm's errors
@@ -59,8 +59,8 @@ class Observation:
     - acceleration: the accelerometer's readings in the same turn, if one is to be calibrated.
     - angle_rad: the angle turned, None in external data; arc_rad: the joint's angles at an arc's ends, the lower first,
       None for whole turns.
-    - ripple: RMS unevenness of the turn, relative to its rate; sidebands: as in `Revolution`.
-    - state_gain: ratio of the noise that the arm's states cause in the mean rate to that in Δθ/T.
+    - ripple: RMS unevenness of the turn, relative to its rate; sidebands: number on either side of a spectral line.
+    - state_gain: the noise that the arm's states cause in the weighted mean rate, relative to that in the plain mean.
     """
 
     sweep: int
@@ -151,7 +151,7 @@ def nearest_axis(vector: Array) -> tuple[str, int]:
 
 
 def check_response(run: RunData, rests: Sequence[Average], dwells: Sequence[DwellReading]) -> None:
-    """Raise Fault `stuck_sensor` if a sensor's readings do not follow the arm's motion."""
+    """Raise Fault `stuck_sensor` or `stuck_axis` if a sensor's readings do not follow the arm's motion."""
     speeds = [finished.sweep.speed_rad_s for finished in swept(run)]
     if speeds:
         check_rests(rests, min(speeds))
@@ -231,7 +231,7 @@ def _average_revolution(
 
 
 def _sample_turn(time_s: Array, motion: ArmMotion, turn: Revolution, covered: NDArray[np.bool_]) -> SampledTurn:
-    """Return a turn at those of the times (n,) at which the arm's motion is recorded, as the mask `covered` shows."""
+    """Return a turn at those of the times (n,) that the mask `covered` marks, because the arm's motion is recorded."""
     fraction = (time_s - turn.start_s) / turn.duration_s
     waves = harmonics(turn.angle_rad * fraction, 2 * turn.sidebands)[covered]
     if not turn.closed:

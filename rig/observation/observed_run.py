@@ -113,10 +113,10 @@ def observe_run(
 
 
 def observe_runs(runs: Sequence[RunData], corrections: Mapping[int, Array] = NO_ROTATIONS) -> tuple[ObservedRun, ...]:
-    """Return the observations of each recording with a finished sweep or dwell; of a repeated step the last is used.
+    """Return the observations of each recording with a finished sweep or dwell; if one was repeated, the last counts.
 
-    The first recording's thresholds apply to all. `corrections` contains, for a stage of the procedure, the
-    `correction` of `observe_run`. Raise as `turner_of` does, and Fault as `observe_run` does.
+    The first recording's thresholds apply to all. `corrections` contains, by stage of the procedure, the rotation
+    (3, 3) of the item from its nominal mount. Raise as `turner_of` does, and Fault as `observe_run` does.
     """
     for run in runs:
         turner_of(run)
@@ -134,10 +134,11 @@ def observe_runs(runs: Sequence[RunData], corrections: Mapping[int, Array] = NO_
 
 
 def _clock_offsets_s(recordings: Sequence[ObservedRun]) -> list[float]:
-    """Return the offset of each recording's clock to the first one's; the controller may restart in between.
+    """Return the number of seconds to add to each recording's times for times on the first recording's clock.
 
-    A recording begins after the previous one has ended, even if the computer's clock disagrees, because that clock may
-    have been set, or the arm may be simulated faster than real time.
+    The clocks differ if the controller restarted in between. The computer's clock relates them. But a recording begins
+    after the previous one has ended, even if the computer's clock disagrees, because that clock may have been set, or
+    the arm may be simulated faster than real time.
     """
     offsets_s = [0.0] * bool(recordings)
     for last, recording in pairwise(recordings):

@@ -30,9 +30,9 @@ def revolution_on_the_board(
 ) -> tuple[int, int, float]:
     """Return a revolution's start and end on the board's clock, µs, and its speed from the joint angles, rad/s.
 
-    The sweep began after the state `first`. `samples` (n,) of SAMPLE_DTYPE and the turner's `states` (m,) should
-    include the arm's motion to the sweep's start, because a slow sweep alone may not determine the time base. Raise
-    Fault as `estimate_time_base` and `ArmMotion.turn` do.
+    The sweep began after the state with the index `first`. `samples` (n,) of SAMPLE_DTYPE and the turner's
+    `states` (m,) should include the arm's motion to the sweep's start, because a slow sweep alone may not determine the
+    time base. Raise Fault as `estimate_time_base` and `ArmMotion.turn` do.
     """
     names = [f"joint {number}" for number in range(kinematics.joints)]
     motion = ArmMotion(states, kinematics, names, reading_std_rad=reading_std_rad)
@@ -44,14 +44,14 @@ def revolution_on_the_board(
 
 
 def find_averaged_sweeps(run: RunData, sensors: Collection[str]) -> frozenset[int]:
-    """Return the sweeps that the board has averaged for each of its sensors."""
+    """Return the finished sweeps that the board has averaged for all those of `sensors` that it reads."""
     sweeps = complete_sweeps(run)
     on_board = [sensor for sensor in sensors if run.sensors[sensor].on_board]
     return sweeps.intersection(*(find_board_averages([run], sensor, sweeps) for sensor in on_board))
 
 
 def find_board_averages(earlier: Sequence[RunData], sensor: str, done: Collection[int]) -> dict[int, BoardObserved]:
-    """Return the board's averages of a sensor from earlier recordings, the newest for each sweep in `done`."""
+    """Return the board's averages of a sensor from earlier recordings, by sweep: the newest of each sweep in `done`."""
     return {
         event.sweep: event
         for run in earlier

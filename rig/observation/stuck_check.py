@@ -24,9 +24,10 @@ REMEDY = "Check the sensor's supply and its bus wiring, then repeat the run"
 
 
 def check_rests(rests: Sequence[Average], slowest_rad_s: float) -> None:
-    """Raise Fault `stuck_sensor` if an axis' means in two rests differ by as much as a sweep would change them.
+    """Raise Fault `stuck_sensor` if an axis' means in two rests differ by half of `slowest_rad_s` or more.
 
-    Raise `stuck_axis` instead if this axis has no noise.
+    A bias changes less; `slowest_rad_s` is the speed of the slowest sweep. Raise `stuck_axis` instead if this axis has
+    no noise.
     """
     if len(rests) < 2:
         return
@@ -45,7 +46,10 @@ def check_rests(rests: Sequence[Average], slowest_rad_s: float) -> None:
 
 
 def check_other_direction(sweep: Sweep, valid_joints: Collection[str | None], fault: Fault) -> None:
-    """Raise Fault `stuck_sensor` instead of `fault` if another sweep of the joint shows that the mounting is right."""
+    """Raise Fault `stuck_sensor` if another sweep of the joint shows that the mounting is right.
+
+    `fault` is the error of this sweep, whose readings contradict the mounting. Return if there is no such other sweep.
+    """
     if sweep.joint_name in valid_joints:
         raise Fault("stuck_sensor", f"{fault.what}; in the other direction it read correctly", REMEDY) from fault
 

@@ -83,7 +83,10 @@ class Lines:
 
 
 def turn_mean(readings: Array, steps: Steps, turn: SampledTurn) -> tuple[Mean, Array]:
-    """Return the mean of readings (n, 3) with resolution `steps`, and the weights (n,) for the arm's rates too."""
+    """Return the mean of readings (n, 3) with resolution `steps`, and the weights (n,) of the readings in it.
+
+    The arm's rates must be averaged with the same weights.
+    """
     ones = whole(readings)
     steady = np.column_stack([ones, turn.regressors])
     lines = _find_turn_lines(readings, steady, turn)
@@ -137,7 +140,7 @@ def line_variance(sizes: Array, means: Array) -> Array:
 
 
 def slow_columns(cycles: Array, sidebands: int) -> NDArray[np.bool_]:
-    """Return a mask (k,) of the columns of spectral lines slower than `SLOW_CYCLES`, as `waves` makes columns."""
+    """Return a mask (k,) of those columns of `waves` that belong to spectral lines slower than `SLOW_CYCLES`."""
     return np.repeat(cycles < SLOW_CYCLES, column_count(sidebands))
 
 
@@ -209,7 +212,7 @@ def _has_slow_ripple(rate: Array) -> bool:
 def _fit_slow_part(rate: Array, fraction: Array) -> Array:
     """Return the part of a rate (n, 1) with less than `SLOW_CYCLES` cycles per turn.
 
-    The part is fitted by harmonics of two turns, because a vibration is not periodic in the turn.
+    The part is fitted by harmonics of a wave that takes two turns, because a vibration is not periodic in one turn.
     """
     halves = harmonics(np.pi * fraction, int(2 * SLOW_CYCLES))
     slow: Array = halves @ fit_columns(halves, rate)

@@ -29,7 +29,7 @@ class Window:
 
 
 def inside(time_s: Array, window: Window) -> slice:
-    """Return the samples of a window among those at rising times (n,)."""
+    """Return the slice of the rising times (n,) that lie in a window."""
     return slice(*np.searchsorted(time_s, [window.start_s, window.end_s]).tolist())
 
 
@@ -83,7 +83,7 @@ def dwelt(run: RunData) -> Iterator[FinishedDwell]:
 
 
 def _is_superseded(run: RunData, rest: Window, superseded: Collection[int]) -> bool:
-    """Return whether the step before the rest, or the next one after it, is in `superseded`."""
+    """Return whether the sweep or dwell before the rest, or the next one after it, is in `superseded`."""
     from rig.data.recording.recorded_events import DwellStarted, SweepStarted
 
     before, after = -1, None

@@ -83,7 +83,7 @@ def _margin_s(window: Window) -> float:
 
 
 def _rest(time_s: Array, rates: Array, acceleration: Array | None, window: Window, steps: Steps) -> HandRest:
-    """Return the rest in a window: means and standard deviations, for which a margin at either end is left out.
+    """Return the rest in a window: its readings' means and standard deviations, without a margin at either end.
 
     Single accelerations that are far from the others, as of damaged lines, are left out too.
     """

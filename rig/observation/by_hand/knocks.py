@@ -14,7 +14,10 @@ MIN_READINGS = 5  # that show which of them are undisturbed
 
 
 def mask_knocks(readings: Array, quantity: Quantity) -> NDArray[np.bool_]:
-    """Return a mask (n,) of the readings (n, 3) at rest that are free of knocks."""
+    """Return a mask (n,) of the readings (n, 3) at rest that are free of knocks.
+
+    If more than a small fraction of the readings deviates, no reading counts as a knock.
+    """
     kept: NDArray[np.bool_] = np.ones(len(readings), dtype=np.bool_)
     if len(readings) < MIN_READINGS:
         return kept

@@ -38,8 +38,9 @@ CANDIDATES = 400  # number of blocks whose mean is tried as the reading at rest
 def find_rests(
     time_s: Array, readings: Mapping[Quantity, Array], *, still_at_first: bool = False, lying: Sequence[Window] = ()
 ) -> tuple[Window, ...]:
-    """Return the rests of at least two blocks, from readings (n, 3) of one or several quantities at rising times (n,).
+    """Return the rests of a body, from readings (n, 3) of one or several quantities at rising times (n,).
 
+    A rest lasts at least two blocks. A block lasts `BLOCK_S`, or longer if it would contain too few readings.
     `still_at_first`: whether the first second scatters like a rest. `lying`: windows in which the body lies still for
     at least a part of the time, as the file of the motion states.
     """
@@ -90,9 +91,10 @@ def _average_unknocked(blocks: Array, noise: Array) -> tuple[Array, Array]:
 
 
 def _find_steady_blocks(still: NDArray[np.bool_], pairs: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return a mask (count,) of the blocks that agree with a neighbour; the `still` blocks if no two blocks agree.
+    """Return a mask (count,) of the still blocks that agree with a neighbour; all still blocks if no two agree.
 
-    `pairs` (count - 1,) says of each block whether it agrees with the next one.
+    `still` (count,) marks the still blocks. `pairs` (count - 1,) says of each block whether it agrees with the next
+    one.
     """
     steady = np.append(pairs, False) | np.append(False, pairs)
     return steady if steady.any() else still

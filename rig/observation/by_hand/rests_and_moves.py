@@ -71,9 +71,10 @@ class NotCounted:
     microsecond_s: float = MICROSECOND_S
 
     def take(self, event: Event, shift_s: float) -> None:
-        """Leave out the move or rest that an `event` reports as refused, or everything before a new beginning.
+        """Leave out the move or rest that an `event` reports as refused.
 
-        The clock of the event's recording is `shift_s` behind the session's.
+        If the event reports that the session begins anew, leave out everything before that time. The clock of the
+        event's recording is `shift_s` behind the session's.
         """
         match event:
             case HandMoveRefused(begin_us, end_us):
@@ -121,10 +122,10 @@ def _is_within(part: HandRest | Move, spans: Sequence[tuple[float, float]]) -> b
 
 
 def replay_runs(runs: Sequence[RunData], name: str) -> tuple[Segmenter, NotCounted, float]:
-    """Return one sensor's rests and moves so far, the omitted parts, and the time at which to continue, s.
+    """Return the segmentation of one sensor's readings so far, the parts to leave out, and the end of the readings, s.
 
-    The item may have been moved between two recordings, so no move connects the rests of different recordings. Raise
-    Fault as `check_readings` does.
+    The end is a time of the session, at which another recording may continue. The item may have been moved between two
+    recordings, so no move connects the rests of different recordings. Raise Fault as `check_readings` does.
     """
     microsecond_s, ends_s = microsecond_of(runs[0].sensors[name]), None
     segmenter, refused = Segmenter(range_of(runs[0].sensors[name])), NotCounted(microsecond_s=microsecond_s)
@@ -155,7 +156,7 @@ def session_of(runs: Sequence[RunData], name: str) -> HandRecording:
 def collect_inputs(settings: RunSettings, provenance: Provenance, sensor: RecordedSensor) -> SessionConditions:
     """Return the inputs of a session's solution other than a sensor's readings.
 
-    One input is the face that is up at first. It is None if an accelerometer shows it, otherwise the face that was
+    One input is the face that is up at first: None if an accelerometer shows this face, otherwise the face that was
     requested first. Raise Refused `clock_unknown` if the error of the clock that stamps the readings is not stated.
     """
     by_hand, uncertainty = settings.by_hand, settings.uncertainty
@@ -181,6 +182,9 @@ def clock_unknown() -> Refused:
 
 
 def rotate_face(face: str, rotation: Array) -> Face:
-    """Return the name of the face nearest to `face` in other axes, to which `rotation` (3, 3) converts vectors."""
+    """Return the face, in other axes, whose direction is nearest to that of `face`.
+
+    `rotation` (3, 3) converts vectors to the other axes.
+    """
     name = nearest_face(rotation @ axis_of(face))
     return next(candidate for candidate in FACES if candidate == name)

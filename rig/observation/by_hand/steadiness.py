@@ -19,7 +19,7 @@ REMEDY = "Give a log of a sensor that lay still all the time; cut off its beginn
 
 
 def contiguous_slices(time_s: Array, sampling: Sampling) -> Iterator[slice]:
-    """Yield the rows between the gaps of a log with increasing times (n,).
+    """Yield a slice of rows from each gap to the next, in a log with increasing times (n,).
 
     A few missing readings are no gap, because `fill_missing` interpolates them, which hardly reduces the noise.
     """
@@ -41,7 +41,8 @@ def fill_missing(readings: Array, numbers: NDArray[np.intp]) -> Array:
 def check_at_rest(time_s: Array, readings: Array, quantity: Quantity) -> None:
     """Raise Fault `not_at_rest` if readings (n, 3) at times (n,) scatter or change by more than noise.
 
-    A sensor that is read slowly while it moves about may look like noise, but no sensor at rest is as noisy.
+    The readings of a moving sensor, if taken at long intervals, may change as randomly as noise. They are recognised by
+    their scatter, because no sensor at rest is as noisy.
     """
     scatter = MAD_TO_STD * np.median(np.abs(readings - np.median(readings, axis=0)), axis=0)
     if (largest := float(scatter.max())) > MAX_SCATTER_RATIO * quantity.steady:

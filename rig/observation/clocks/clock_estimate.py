@@ -139,7 +139,7 @@ class _MovingTimes:
 
     @classmethod
     def find(cls, motion: KnownMotion) -> "_MovingTimes":
-        """Return the blocks of `BLOCK_S` with a speed of at least `MOVING_SPEED_RATIO` of the highest, or near one."""
+        """Return all blocks; `near` marks those near a speed of at least `MOVING_SPEED_RATIO` times the highest one."""
         start_s, end_s = motion.time_s[[0, -1]].tolist()
         count = int((end_s - start_s) / BLOCK_S) + 1
         middle_s = start_s + BLOCK_S * (np.arange(count)[:, None] + (np.arange(BLOCK_RATES) + 0.5) / BLOCK_RATES)

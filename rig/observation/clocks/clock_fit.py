@@ -80,9 +80,10 @@ def _is_contradiction(clock: TimeBase, refined: TimeBase) -> bool:
 def _list_stages(
     clock: TimeBase, board_time_s: Array, readings: Array, motion: KnownMotion
 ) -> Iterator[tuple[Array, Array, KnownMotion]]:
-    """Yield times, readings and motion for each fit: averaged over long times, then over short times.
+    """Yield the times, readings and motion of each fit: first averaged over a long time, then over a short time.
 
-    Readings that are too few or too slow for the second average are yielded without it.
+    An average is omitted if it would leave too few readings. If the second average is omitted, the last fit is of the
+    readings as they are.
     """
     start_s, end_s = clock.controller_time_s(board_time_s[[0, -1]]).tolist()
     step_s = median_step(board_time_s)

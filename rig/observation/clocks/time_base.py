@@ -16,7 +16,7 @@ CHECK_SENSOR = "Check that the sensor is fixed to the flange and read in the rig
 class TimeBase:
     """A clock: controller time = board time + `offset_s` + `drift` × (board time − `reference_s`), in seconds.
 
-    `reference_s` is the board's mean time of the data used, at which offset and drift are nearly uncorrelated.
+    `reference_s` is the mean board time of the data used, at which offset and drift are nearly uncorrelated.
     `covariance` (2, 2) is for (`offset_s`, `drift`). `zero_rate_rad_s` (3,) is the fitted reading at rest.
     """
 

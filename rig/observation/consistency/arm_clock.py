@@ -36,7 +36,7 @@ class ClockRate:
 
 
 def compare_with_computer(motion: ArmMotion) -> ClockRate:
-    """Return the rate of the controller's clock relative to the computer's, from a straight line through arrival times.
+    """Return the rate error of the controller's clock against the computer's, by a straight line through arrival times.
 
     States arrive in bursts after delays, so the degrees of freedom are fewer than the states.
     """
@@ -84,7 +84,7 @@ def find_encoder_noise_rad(recordings: Sequence[ObservedRun]) -> float:
 
 
 def _difference_sweeps(recordings: Sequence[ObservedRun]) -> Iterator[tuple[Sweep, Array]]:
-    """Yield each finished sweep with the sixth differences (n, k) of its joint angles, for evenly spaced states."""
+    """Yield each finished sweep with the sixth differences (n, k) of the k joint angles over evenly spaced states."""
     for recording in recordings:
         motion = recording.motion
         for finished in swept(recording.run):

@@ -44,14 +44,14 @@ def compare_board_means(sensor: str, recordings: Sequence[ObservedRun]) -> dict[
 
 
 def _deviation(recording: ObservedRun, stream: Stream, turn: Observation, observed: BoardObserved) -> float:
-    """Return the largest deviation of the three axes, in standard deviations: board's average minus prediction.
-
-    The frequencies of slow spectral lines are uncertain, so the variance includes the effect that these lines, with
-    random phases, have on the board's average.
+    """Return the largest deviation of the board's average from its prediction on any axis, in standard deviations.
 
     The computer's mean predicts the board's average, after two corrections for the board's different window and
     weights. The reading due to the rotation, which is the mean minus the reading at zero rate, is scaled to the arm's
     mean rate in the board's window. The average of the spectral lines in that window is added.
+
+    The frequencies of slow spectral lines are uncertain, so the variance includes the effect that these lines, with
+    random phases, have on the board's average.
     """
     zero, average, board = stream.clock.zero_rate_rad_s, turn.average, observed.observation
     axis = turn.axis_flange
@@ -77,10 +77,10 @@ def _deviation(recording: ObservedRun, stream: Stream, turn: Observation, observ
 
 
 def _nuisance_columns(time_s: Array, turn: Observation, rates_rad_s: Array) -> Array:
-    """Return the columns (n, k) that the computer's mean of a turn cancels and the board's mean does not.
+    """Return the columns (n, k), at times (n,), that the computer's mean of a turn cancels and the board's does not.
 
-    They are at times (n,), with rates (n,) about the axis: spectral lines, the turn's first two harmonics, and the
-    effect of a slow ripple on a lagging sensor, in this order.
+    The columns are, in this order, the spectral lines, the turn's harmonics and, for whole turns, the effect of a slow
+    ripple on a lagging sensor. `rates_rad_s` (n,) are the rates about the turn's axis.
     """
     average = turn.average
     fraction = (time_s - average.start_s) / average.duration_s

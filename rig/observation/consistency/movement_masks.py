@@ -13,7 +13,12 @@ from rig.observation.windows import Window, iterate_rests, swept
 
 @dataclass(frozen=True, slots=True)
 class MovementMasks:
-    """Masks (n,) of samples: after the first sweep's start, in sweeps, in rests, and in the middle of each rest."""
+    """Masks (n,) of samples.
+
+    - moving: from the start of the first sweep to the end of the last sweep or rest.
+    - sweeping: in any sweep; resting: in any rest.
+    - still: a mask for each rest, of the samples in its middle.
+    """
 
     moving: NDArray[np.bool_]
     sweeping: NDArray[np.bool_]
@@ -22,7 +27,7 @@ class MovementMasks:
 
 
 def mask_movement(run: RunData, time_s: Array) -> MovementMasks:
-    """Return masks of samples at controller times (n,) for what the arm did; the recording must contain a sweep."""
+    """Return the masks of samples at controller times (n,), for a recording with at least one finished sweep."""
     sweeps, rests = [finished.window for finished in swept(run)], list(iterate_rests(run))
     return MovementMasks(
         moving=_mask_windows(time_s, Window(sweeps[0].start_s, max(window.end_s for window in [*sweeps, *rests]))),

@@ -79,7 +79,7 @@ def raw_field_dwells(name: str, recording: ObservedRun) -> list[RawDwell]:
 
 
 def rests_of_dwells(dwells: Sequence[RawDwell]) -> list[RawReadings]:
-    """Return the raw readings of each dwell, marked as those of a rest, and their residuals from the dwell's mean."""
+    """Return each dwell in the form of the raw readings of a rest; their residuals are those from the dwell's mean."""
     residuals = [dwell.still_counts - dwell.still_counts.mean(axis=0) for dwell in dwells]
     return [RawReadings(REST, dwell.counts, rest, np.zeros(3)) for dwell, rest in zip(dwells, residuals, strict=True)]
 

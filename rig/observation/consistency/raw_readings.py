@@ -21,7 +21,8 @@ class RawReadings:
 
     - sweep: index among the sensor's revolutions, −1 for a rest or dwell.
     - counts (n, 3): the readings as recorded.
-    - residual_counts (m, 3): readings minus their segment's mean and the vibration, for samples with recorded motion.
+    - residual_counts (m, 3): readings minus the mean of their segment and minus the vibration, only of samples at which
+      the motion was recorded.
     - vibration_counts (3,): RMS of the arm's vibration.
     - vibration_rad2 (3,): mean square of the body's rotation by vibration from one random time of a rest to another.
     """
@@ -34,7 +35,7 @@ class RawReadings:
 
 
 def counts_of(stream: Stream, quantity: Quantity, inside: slice) -> NDArray[np.int64]:
-    """Return the counts (n, 3) of a quantity in the samples `inside`, as recorded."""
+    """Return the counts (n, 3) of a quantity as recorded, in the samples of the slice `inside`."""
     counts: NDArray[np.int64] = stream.sensor.channel(quantity).counts(stream.raw)[inside].astype(np.int64)
     return counts
 

@@ -50,9 +50,9 @@ def segment_counts(revolutions: int) -> tuple[int, int]:
 
 @dataclass(frozen=True, slots=True)
 class MotionInterval:
-    """The interval of a motion of the arm, on the clock of its states.
+    """An interval of the arm's `motion`, from `start_s` to `end_s` on the clock of the arm's states.
 
-    `unseen_rad`: angle at the motion's beginning or end that the samples may miss.
+    `unseen_rad`: standard deviation of the angle that the samples miss at either end of the interval.
     """
 
     motion: ArmMotion
@@ -159,7 +159,7 @@ def _divide(stream: Stream, average: Average, usable: NDArray[np.bool_], count: 
 def _segment_revolution(
     stream: Stream, motion: ArmMotion, turn: Observation, count: int, sweep: int
 ) -> SegmentedAverage:
-    """Return a revolution or an arc with the averages of its segments, without the spectral lines of the whole average.
+    """Return a revolution or an arc with the averages of its segments, from which spectral lines are removed.
 
     Spectral lines slower than `SLOW_CYCLES` remain, because weights that cancel them would amplify the encoders' noise.
     The variance of each segment includes these slow lines, unless one step of the readings explains them. The noise is
@@ -223,7 +223,7 @@ def _slow_line_variance(slow: Array, weights: Array, residuals: Array) -> Array:
 
 
 def _explain_by_step(residuals: Array) -> float:
-    """Return the largest part of the sum of squares of residuals (n, 3) that one step, at any place, explains."""
+    """Return by how much one step, at the best place, reduces the sum of squares of residuals (n, 3)."""
     before = np.arange(1, len(residuals))[:, None]
     sums = np.cumsum(residuals - residuals.mean(axis=0), axis=0)[:-1]
     return float(np.sum(sums**2 * (1 / before + 1 / (len(residuals) - before)), axis=1).max())

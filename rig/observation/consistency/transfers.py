@@ -150,7 +150,7 @@ def _scatter(readings: Array, time_s: Array, motion: ArmMotion, down_m_s2: Array
 
 
 def _find_transfers(run: RunData, stream: Stream, motion: ArmMotion) -> Iterator[MotionInterval]:
-    """Yield the intervals from before the arm moves until it has stopped, if no sample is missing.
+    """Yield the interval of each transfer without a missing sample, from before the arm moves until it has stopped.
 
     A transfer is a part of a turn, so a shaft whose encoder is exact only over whole turns has no usable transfers.
     """

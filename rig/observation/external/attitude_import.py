@@ -197,16 +197,19 @@ def average_placements(samples: Samples, table: Mapping[str, Array], *, find_clo
 
 
 def _drop_frozen(rows: "_ReferenceRows", time_s: Array, rate: Array) -> tuple["_ReferenceRows", tuple[Omitted, ...]]:
-    """Return the rows without rows in which the reference had stopped, and an entry for the rows left out."""
+    """Return the rows except those in which the reference had stopped, and an entry for the rows left out."""
     fresh = rows.select(np.flatnonzero(~find_frozen(rows.rows_s, rows.attitudes, time_s, rate)))
     return fresh, tuple(_list_omitted(rows, fresh, FROZEN))
 
 
 @dataclass(frozen=True, slots=True)
 class _ReferenceRows:
-    """The N rows of a reference: `windows`, `attitudes` (N, 3, 3), and rates (N, 3) and stds (N,), None if not stated.
+    """The N rows of a reference.
 
-    `numbers` (N,) are the rows' numbers in the file, from 1.
+    - `windows`: the window of time of each row; `numbers` (N,): the rows' numbers in the file, from 1.
+    - `attitudes` (N, 3, 3): rotations from body to table.
+    - `rates_rad_s` (N, 3), `std_rad` (N,): the stated rates, and the stated standard deviations of the attitudes; None
+      if not stated.
     """
 
     windows: list[Window]
@@ -224,15 +227,15 @@ class _ReferenceRows:
         return _ReferenceRows([self.windows[row] for row in rows], self.attitudes[rows], rates, std, self.numbers[rows])
 
     def join(self, time_s: Array, readings_rad_s: Array) -> Turning:
-        """Return the rows with a gyroscope's readings (n, 3) at times (n,)."""
+        """Return the rows together with a gyroscope's readings (n, 3) at times (n,)."""
         return Turning(time_s, readings_rad_s, self.rows_s, self.attitudes, self.std_rad)
 
 
 def select_reports(rows: Mapping[str, Array]) -> tuple[dict[str, Array], NDArray[np.intp], tuple[Omitted, ...]]:
-    """Return the attitudes that the reference reported, their numbers in the file, from 1, and what is left out.
+    """Return the rows that the reference reported, their numbers in the file, from 1, and the omissions.
 
-    Left out are rows of zero length whose time a longer one has, rows of four zeros or without numbers, rows that were
-    interpolated between reports, and a few others whose quaternions are no unit quaternions.
+    Omitted are rows of zero length whose time a longer row has too, rows of four zeros or without numbers, rows that
+    were interpolated between reports, and a few others whose quaternions are no unit quaternions.
     """
     quaternions = np.column_stack([rows[name] for name in QUATERNION])
     with np.errstate(over="ignore"):  # of numbers that are no quaternion's

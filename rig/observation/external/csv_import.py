@@ -96,7 +96,7 @@ def read_sweeps(path: Path, mapped: MappedColumns | None = None, origin_s: int =
 
 
 def average_sweeps(samples: Samples, sweeps: Mapping[str, Array]) -> ExternalData:
-    """Return the averages of samples, including a gyroscope's, over sweeps given by the columns of their file.
+    """Return the averages of the gyroscope's samples over the `sweeps`, which are the columns of their file.
 
     Raise Refused `bad_sweep`, `overlapping_sweeps`; Fault `stuck_sensor`; and as `check_times` and `average` do.
     """
@@ -116,7 +116,11 @@ def average_sweeps(samples: Samples, sweeps: Mapping[str, Array]) -> ExternalDat
 
 
 def _add_turns(samples: Samples, sweeps: Mapping[str, Array], data: ExternalData) -> ExternalData:
-    """Return the data with those turns that have a stated angle and start and end at rest."""
+    """Return the data with its turns, which are rows with a stated angle that start and end at rest.
+
+    The numbers of the other rows with a sweep are added to `by_mean`, or to `omitted` if missing readings may hide a
+    part of the turn.
+    """
     declared = DeclaredTurns(sweeps["angle_rad"], *(sweeps.get(name) for name in STD_COLUMNS))
     by_angle = find_turns(samples.time_s, samples.readings[RATE], declared, data.sweeps, data.rests)
     if by_angle is None:

@@ -177,7 +177,7 @@ def _refuse_separate_rows(
 
 
 def samples_in(table: Columns, where: str) -> Samples:
-    """Return the readings in columns (n,), in the order of `order_stamps`; error messages call their source `where`.
+    """Return the readings in columns (n,), in the order of time; error messages call their source `where`.
 
     Raise Refused `wrong_columns`, `wrong_unit`, `not_a_number`, and as `check_times` does.
     """

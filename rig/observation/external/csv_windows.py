@@ -42,7 +42,7 @@ def check_times(time_s: Array, where: str = "the samples") -> None:
 
 
 def find_overlap(windows: Sequence[Window]) -> tuple[int, int] | None:
-    """Return the numbers, from 1, of two windows that share samples; None if no windows overlap."""
+    """Return the numbers, from 1, of two windows that overlap in time; None if no windows do."""
     order = np.argsort([window.start_s for window in windows]).tolist()
     for first, second in pairwise(order):
         if windows[second].start_s < windows[first].end_s:
@@ -99,10 +99,12 @@ def average_bridged(readings: Array, numbers: NDArray[np.intp], window: Window, 
 
 @dataclass(frozen=True, slots=True)
 class RowGaps:
-    """The readings of a row: how many are present (`count`), `expected` and `missing`, and the number of `gaps`.
+    """The gyroscope's readings in the window of one row of a file: their number `count`, and the gaps between them.
 
-    `hidden_rad`: standard deviation of the rotation that the gaps hide; `first_s`: time of the reading before the first
-    gap; `is_inside`: whether the recording covers the row.
+    - `expected`: the number of readings without losses; `missing`, `gaps`: the numbers of missing readings and of gaps.
+    - `hidden_rad`: standard deviation of the rotation that the gaps hide; `first_s`: time of the reading before the
+      first gap, None without a gap.
+    - `is_inside`: whether the recording covers the row.
     """
 
     count: int
@@ -121,7 +123,7 @@ class RowGaps:
 
 
 def find_row_gaps(time_s: Array, readings: Array, sampling: Sampling, windows: Sequence[Window]) -> list[RowGaps]:
-    """Return the gaps between readings (n, 3), rad/s at times (n,), in each window."""
+    """Return the gaps in each window, for a gyroscope's readings (n, 3), rad/s, at times (n,)."""
     expected = sampling.count_expected(time_s, np.array([(window.start_s, window.end_s) for window in windows]))
     rows = []
     for window, wanted in zip(windows, expected.tolist(), strict=True):

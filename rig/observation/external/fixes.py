@@ -62,10 +62,10 @@ class GatheredFixes:
 def gather(turning: Turning, window_s: float | None = None, clock_s: float = 0.0) -> GatheredFixes:
     """Return the fixes of a reference: its rows' attitudes, averaged over windows of a given or a suitable length.
 
-    Time t of the reference is time t + `clock_s` of the readings. Only increments in which the body moves are counted:
-    raise a Fault if too few of these remain, or fewer than were left out. The Fault's name is the most frequent reason
-    for leaving out an increment (`lost_samples`, `saturation` or `turned_too_fast`), or `too_few_observations` if no
-    increment was left out.
+    Time t of the reference is time t + `clock_s` of the readings. Increments in which the body lies still are not
+    counted. Raise a Fault if too few of the others remain, or if more of them are left out than remain. The Fault's
+    name is the most frequent reason for leaving out an increment (`lost_samples`, `saturation` or `turned_too_fast`),
+    or `too_few_observations` if no increment was left out.
     """
     turning = select_covered(turning, clock_s)
     if len(turning.rows_s) < 2:
@@ -112,10 +112,10 @@ def _fixes(turning: Turning, still: NDArray[np.bool_], window_s: float) -> Fixes
 
 
 def _measure_walk(turning: Turning, rests_s: Array) -> tuple[float, float]:
-    """Return the sum of squares, rad²/s, of a gyroscope's angle random walk in k rests, and its degrees of freedom.
+    """Return a sum of squares, rad²/s, and its degrees of freedom; their ratio is the square of the angle random walk.
 
-    `rests_s` (k, 2) are the rests' starts and ends. The readings are first averaged over `BATCH_MEAN_S`, because their
-    noise may be coloured over a few samples.
+    They are computed from the gyroscope's readings in k rests, whose starts and ends are `rests_s` (k, 2). The readings
+    are first averaged over `BATCH_MEAN_S`, because their noise may be coloured over a few samples.
     """
     squares, dof = 0.0, 0.0
     for start_s, end_s in rests_s.tolist():

@@ -54,9 +54,11 @@ class Files:
 def build_recording(
     files: Files, site: Site, request: SolveOptions, *, second_order: bool = False, reference_c: float | None = None
 ) -> RunData:
-    """Return the recording of a calibration, over temperature if the reference temperature `reference_c` is given.
+    """Return the contents of the files as a recording that can be solved with the options `request`.
 
-    Raise Refused `no_file`, `wrong_columns`, `wrong_unit`, `not_a_number`, and as `check_times` does.
+    If `second_order`, the accelerometer's model has terms of second order. If the reference temperature `reference_c`
+    is given, the solution is over temperature. Raise Refused `no_file`, `wrong_columns`, `wrong_unit`,
+    `not_a_number`, and as `check_times` does.
     """
     column_map = files.columns
     needed = () if files.tells == "attitudes" else [RATE]

@@ -19,9 +19,9 @@ MIN_RESTS, MIN_TOTAL_S = 2, 1.0  # that show a scatter, and their total duration
 
 @dataclass(frozen=True, slots=True)
 class MeansAtRest:
-    """The gyroscope's mean `readings_rad_s` (k, 3) in k rests, and the body's rate from the reference (k, 3).
+    """The gyroscope's mean `readings_rad_s` (k, 3) in k rests, and the body's rates (k, 3) from the reference.
 
-    `rounding` (3,) is the variance that rounding to coarse steps adds to each of them, alike in all rests.
+    `rounding` (3,) is the variance that rounding to coarse steps adds to each mean, the same in all rests.
     """
 
     readings_rad_s: Array
@@ -62,9 +62,10 @@ def means_at_rest(turning: Turning, clock_s: float) -> MeansAtRest | None:
 def find_rests_at_other_bias(
     time_s: Array, readings: Array, lying: Sequence[Window], rests: Sequence[Window]
 ) -> list[Window]:
-    """Return the declared windows that are quiet but were not found to be rests, because the bias had changed.
+    """Return the windows of `lying` that are quiet but not among the rests found, because the bias had changed.
 
-    `lying` are the declared windows, `rests` the rests found in the readings (n, 3) at times (n,).
+    In the windows `lying` the body should lie still; the result is without their ends, whose times are uncertain.
+    `rests` are the rests found in the readings (n, 3) at times (n,).
     """
     if not rests:
         return []

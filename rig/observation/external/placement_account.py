@@ -128,7 +128,10 @@ class Account:
             yield Omitted("rows", len(moving), total, "not_at_rest: the body moves in them", where)
 
     def _find_gaps_s(self, rows: NDArray[np.bool_]) -> Array:
-        """Return the longest gaps (N,), s, in those `rows` that show no rest; 0 for other rows, and up to `BLOCK_S`."""
+        """Return the longest gap (N,), s, between the samples of each row.
+
+        The result is 0 if no gap is longer than `BLOCK_S`, for rows in a rest, and for rows that are not among `rows`.
+        """
         gaps_s = np.zeros(len(rows))
         for row in np.flatnonzero((self.rest < 0) & rows).tolist():
             longest_s = float(np.diff(self._list_edges_s(row)).max())

@@ -126,7 +126,7 @@ def find_placements(time_s: Array, readings: Mapping[Quantity, Array], rows: Att
 
 
 def _closed_slice(time_s: Array, window: Window) -> NDArray[np.intp]:
-    """Return the samples of a window, including those at either end."""
+    """Return the indices of the samples of a window, including those at either end."""
     first, last = np.searchsorted(time_s, window.start_s), np.searchsorted(time_s, window.end_s, side="right")
     return np.arange(first, last)
 
@@ -134,7 +134,7 @@ def _closed_slice(time_s: Array, window: Window) -> NDArray[np.intp]:
 def _join_rests(
     time_s: Array, readings: Mapping[Quantity, Array], rests: Sequence[Window], dwells: Sequence[Window]
 ) -> list[tuple[Window, ...]]:
-    """Return the rests in groups: one group across a knock if the readings agree before and after, without a turn."""
+    """Return the rests in groups: rests in the same group are separated only by knocks, not by a movement."""
     joined: list[tuple[Window, ...]] = []
     for rest in rests:
         if joined and _same_rest(time_s, readings, joined[-1][-1], rest, dwells):
@@ -208,8 +208,8 @@ def _find_rest(time_s: Array, window: Window, rests: Sequence[_PlacedRest]) -> t
 def _mask_inner(rest: NDArray[np.intp], windows_s: Array, starts_s: Array, ends_s: Array) -> NDArray[np.bool_]:
     """Return a mask (N,) of the rows in a rest, except rows near the start or end of the rest.
 
-    Near the ends a reference that lags shows motion. If all rows of a rest are near an end, the mask includes them
-    all. `rest` (N,): the number of the rest in which each row lies, or −1.
+    Near the ends of a rest, a lagging reference still shows motion. If all rows of a rest are near an end, the mask
+    includes them all. `rest` (N,): the number of the rest in which each row lies, or −1.
     """
     at_rest = np.flatnonzero(rest >= 0)
     middles_s, number = windows_s[at_rest].mean(axis=1), rest[at_rest]

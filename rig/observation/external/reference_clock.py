@@ -88,8 +88,8 @@ def check_one_clock(turning: Turning, rates_rad_s: Array | None) -> None:
 def check_offset(turning: Turning) -> None:
     """Raise Fault `clocks_apart` if rows and readings show the same rotation only after a shift in time.
 
-    If the first and the last quarter of the readings need different shifts to agree with the rows, a clock was set in
-    between. A single step back in the times of the rows shows this too.
+    Raise it also if a clock was set during the recording: the first and the last quarter of the readings need different
+    shifts to agree with the rows, or the times of the rows step back once.
     """
     middles_s = turning.rows_s.mean(axis=1)
     backward = np.flatnonzero(np.diff(middles_s) < 0)

@@ -50,7 +50,10 @@ def select_covered(turning: Turning, clock_s: float = 0.0) -> Turning:
 
 
 def join_rests(turning: Turning, clock_s: float) -> tuple[Turning, NDArray[np.bool_]]:
-    """Return the rows, with those of each rest joined into one, and a mask (N,) of the rows that are rests."""
+    """Return the rows, with those of each rest joined into one, and a mask (N,) of the rows that are rests.
+
+    `clock_s` converts the rows' times to those of the readings; the result keeps the rows' own times.
+    """
     still = _find_still(turning, clock_s)
     middles_s = turning.rows_s.mean(axis=1) + clock_s
     kept = np.ones(len(middles_s), dtype=np.bool_)

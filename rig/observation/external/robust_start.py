@@ -31,7 +31,10 @@ MIN_EXPLAINED = 0.5  # fraction of the readings' variance, by F
 
 @dataclass(frozen=True, slots=True)
 class RobustStart:
-    """Initial values, and the fraction of the readings' rotation that they leave `unexplained`: 1 for the default."""
+    """Initial values, and the fraction of the readings' rotation that they leave `unexplained`.
+
+    The fraction is 1 if nothing fits and the values are those of an aligned sensor.
+    """
 
     state: DriftState
     unexplained: float
@@ -99,7 +102,10 @@ def _select_evenly(indices: NDArray[np.intp]) -> NDArray[np.intp]:
 
 
 def _fit(design: Array, turned: Array) -> tuple[float, Array]:
-    """Return the fraction of `turned` (k, 3) that the fit `design` (k, 4) · X leaves unexplained, and X: Fᵀ above b."""
+    """Return the fraction of `turned` (k, 3), without bias, that the fit `design` · X leaves unexplained, and X (4, 3).
+
+    `design` is (k, 4). The first three rows of X are Fᵀ, and the last row is the bias b.
+    """
     aligned = np.concatenate([np.eye(3), np.zeros((1, 3))])
     weight = np.ones(len(design))
     solution = aligned

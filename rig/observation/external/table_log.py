@@ -34,7 +34,8 @@ def read_table_log(
 def _attitudes(log: Columns, table: TableSection) -> dict[str, Array]:
     """Return the columns (N,) of attitudes, with one row for each of the N records of the log.
 
-    A row's window reaches half-way to the records before and after. The outermost axis carries the others.
+    A row's window begins half-way from the record before, and ends half-way to the next one. The outermost axis carries
+    the others.
     """
     from scipy.spatial.transform import Rotation
 

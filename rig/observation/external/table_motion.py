@@ -59,7 +59,7 @@ class TableMotion:
         return rate
 
     def covered(self, time_s: Array) -> NDArray[np.bool_]:
-        """Return whether the table's motion is recorded at times (n,), as `KnownMotion` defines it."""
+        """Return a mask of the times (n,) at which the table's motion is recorded, as `KnownMotion` defines it."""
         return closely_followed(self.time_s, self._close, time_s)
 
 

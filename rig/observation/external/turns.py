@@ -36,9 +36,10 @@ class TurnedData:
     """The input of a solution by increments.
 
     - `gyroscope`: the gyroscope's readings; `turns`: the turns from rest to rest, with the numbers `rows` in the file.
-    - `means`: the mean readings in the rests, and in the sweeps, which do not start and end at rest.
-    - `noise_dof`, `bias_dof`: degrees of freedom of the noise, and of the bias' change from rest to rest.
-    - `rests`: the rests of the file and of the readings, also those in which the bias had changed.
+    - `means`: the mean readings in the rests, and in those rows that do not start and end at rest.
+    - `noise_dof`, `bias_dof`: degrees of freedom of the estimated noise, and of the estimated change of the bias from
+      rest to rest.
+    - `rests`: the rests that the file states or the readings show, also those in which the bias had changed.
     - `hiding`: numbers of omitted rows, in which missing readings may hide a part of the turn.
     """
 
@@ -127,7 +128,7 @@ def _find_other_bias(
 ) -> Iterator[Window]:
     """Yield the pauses in which the body lies still but the bias had changed: the readings are quiet, but not near 0.
 
-    `rates` (n, 3) are the readings minus the usual bias; `lying` as in `find_rests`.
+    `rates` (n, 3) are the readings minus the usual bias; `lying` are the rests found with this bias.
     """
     middles = [
         Window(pause.start_s + (pause.end_s - pause.start_s) / 4, pause.end_s - (pause.end_s - pause.start_s) / 4)

@@ -1,8 +1,8 @@
 """Readings and attitudes from a bag of ROS 2 or ROS 1, without ROS: `sensor_msgs/Imu` and `MagneticField`, and poses.
 
-Times are those in the messages' headers. A pose (`geometry_msgs/PoseStamped` or `TransformStamped`) is the body's in
-the room. The reader runs in a process of its own (`rig.observation.formats.sample_files`) and holds one block of the
-bag at a time.
+Times are those in the messages' headers. A pose (`geometry_msgs/PoseStamped` or `TransformStamped`) states the body's
+attitude in the room. The reader runs in a process of its own (`rig.observation.formats.sample_files`) and holds one
+block of the bag at a time.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -51,10 +51,11 @@ def _is_ros_1(path: Path) -> bool:
 
 
 def bag_readings(path: Path, inside: str | None) -> Iterator[Part]:
-    """Yield, in blocks, the readings of a bag's topic named `inside`, or if None of the only topic of type Imu.
+    """Yield, in blocks, the readings of one topic of a bag.
 
-    The columns are as in a CSV file, times are measured from the beginning of the bag, and rows have the order of the
-    bag. Messages without a rate are left out and counted. If any of the remaining messages lacks an acceleration, no
+    `inside` is the topic's name. If it is None, the bag must have a single topic of type Imu, which is read. The
+    columns are as in a CSV file, times are measured from the beginning of the bag, and rows have the order of the bag.
+    Messages without a rate are left out and counted. If any of the remaining messages lacks an acceleration, no
     accelerations are read. Raise Refused `missing_extra` or `bag_topic`, and any error of the parser for a damaged bag.
     """
     with _open_bag(path) as reader:

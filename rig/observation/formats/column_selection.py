@@ -205,7 +205,7 @@ def _list_missing(names: Sequence[str], header: Header) -> list[str]:
 
 
 def _find_unexpected(names: Sequence[str], header: Header) -> Iterator[str]:
-    """Yield the faults of a file's column names, except missing columns."""
+    """Yield the errors of a file's column names, in words; missing columns are not among them."""
     own_names = header.names
     yield from (f"names {name} twice" for name in own_names if names.count(name) > 1)
     present = [name for name in names if name in header.one_of]

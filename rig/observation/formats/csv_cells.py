@@ -100,7 +100,10 @@ def repeats(row: Sequence[str], headings: Sequence[str]) -> bool:
 
 
 def find_wrong_unit(cells: Sequence[str], factors: Sequence[float]) -> int | None:
-    """Return the index of the first cell in a row of units that contradicts its column's unit, or None."""
+    """Return the index of the first cell, in a row of units, that names another unit than its column's, or None.
+
+    `factors` are the sizes of the columns' units. A cell without a known unit contradicts nothing.
+    """
     for index, (cell, factor) in enumerate(zip(cells, factors, strict=True)):
         unit = unit_of(cell)
         if unit is not None and (unit.zero or abs(unit.size - factor) > 1e-9 * factor):

@@ -41,7 +41,7 @@ LINE = "line"  # an additional column: the number of each row's line
 class CsvTable:
     """A file's `columns` (n,) by name, NaN for a blank cell, and the line number (n,) of each row in the file.
 
-    Times are relative to `origin_s`, a whole number of seconds: 0, unless the clock began in 1970 or so.
+    Times are relative to `origin_s`, a whole number of seconds: 0, unless times are large, as those since 1970 are.
     """
 
     columns: dict[str, Array]

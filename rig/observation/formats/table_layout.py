@@ -158,7 +158,7 @@ def _sample_rows(rows: Iterator[list[str]], heading: Sequence[str]) -> _SampledT
 
 
 def _names_columns(heading: Sequence[str], below: Sequence[Sequence[str]]) -> bool:
-    """Return whether the row below a heading names columns, of which the heading names groups.
+    """Return whether a heading names groups of columns, and the first row below it names the columns.
 
     The heading of a group is above its first column, so some of its cells are blank.
     """

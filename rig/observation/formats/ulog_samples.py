@@ -55,7 +55,10 @@ def is_ulog(path: Path) -> bool:
 
 
 def ulog_readings(path: Path, inside: str | None = None) -> Iterator[Part]:
-    """Yield, in blocks, a log's readings: those of the instance `inside` of each sensor, or those of `sensor_combined`.
+    """Yield, in blocks, the readings of one instance of each sensor in a log, or those of `sensor_combined`.
+
+    `inside` is the number of the instance, or "sensor_combined". If it is None, instance 0 is read, or
+    `sensor_combined` if instance 0 of the gyroscope is missing or logged less than half as often.
 
     Raise Refused `missing_extra` or `ulog_topic`, and any error of the parser for a damaged log.
     """
@@ -75,7 +78,7 @@ def ulog_readings(path: Path, inside: str | None = None) -> Iterator[Part]:
 
 
 def _is_combined(path: Path, topics: Mapping[tuple[str, int], Any], inside: str | None) -> bool:
-    """Return whether to read `sensor_combined`, because it is named, or because the raw topic is rare or missing.
+    """Return whether to read `sensor_combined`: if `inside` names it, or is None and `sensor_gyro` is rare or missing.
 
     Raise Refused `ulog_topic` if the log does not hold the named topic.
     """
@@ -104,7 +107,7 @@ def _rate_hz(data: Any) -> float:
 
 
 def _read_raw(topics: Mapping[tuple[str, int], Any], instance: int) -> LogReadings:
-    """Return the readings of one instance of `sensor_gyro` and `sensor_accel`, or of the one that is logged."""
+    """Return the readings of one instance of `sensor_gyro` and `sensor_accel`, or of the only one that is logged."""
     read = {
         quantity: _read_topic(f"{topic} {instance}", topics[topic, instance])
         for topic, quantity in TOPICS.items()
@@ -125,9 +128,10 @@ def _read_raw(topics: Mapping[tuple[str, int], Any], instance: int) -> LogReadin
 
 
 def _interpolate(time_us: Array, other_us: Array, readings: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Return readings (m, 3) at `other_us` (m,), interpolated to `time_us` (n,), and which of these (n,) they cover.
+    """Return readings (m, 3), taken at `other_us` (m,), at the times `time_us` (n,), and a mask (n,) of covered times.
 
-    A time is covered between two readings without a gap, and as far from the first or last one as readings usually are.
+    A time is covered if it lies between two readings without a gap. Before the first reading, and after the last one,
+    times are covered up to the usual interval between readings.
     """
     other_us, order = np.unique(other_us, return_index=True)
     steps_us = np.diff(other_us)

@@ -99,7 +99,7 @@ class ArmMotion:
         return mean
 
     def mean_attitudes(self, starts_s: Array, ends_s: Array) -> Array:
-        """Return the mean rotations (n, 3, 3) of `attitude` between n starts and n ends."""
+        """Return the mean rotations (n, 3, 3), as `attitude` does, in n intervals from `starts_s` to `ends_s` (n,)."""
         middles_s = (ends_s - starts_s) / (2 * ATTITUDES)
         times_s = np.linspace(starts_s, ends_s, ATTITUDES, endpoint=False) + middles_s
         mean: Array = self.attitudes(times_s).mean(axis=0)
@@ -111,7 +111,7 @@ class ArmMotion:
         return rotations
 
     def axes(self, q_rad: Array) -> Array:
-        """Return the joints' axes (…, 3, 6), directed for growing angles, at joint angles (…, 6)."""
+        """Return the unit vectors (…, 3, 6) of the joints' axes for positive rotation, at joint angles (…, 6)."""
         axes: Array = self.mount @ flange_axes(q_rad, self.kinematics)
         return axes
 
@@ -169,9 +169,9 @@ class ArmMotion:
     def rates_at_samples(self, time_s: Array) -> Array:
         """Return the flange's rate (n, 3), rad/s, around consecutive evenly spaced samples at rising times (n,).
 
-        A sample's rate is the mean from half-way after the previous sample to half-way before the next one, or over
-        `RATE_STEP_S` if samples are far apart. Joints that stand still between the first and the last sample get the
-        rate zero, so that their encoders' noise is not added to the motion.
+        A sample's rate is the mean over one interval between samples, or over `RATE_STEP_S` if samples are far apart,
+        with the sample in the middle. Joints that stand still between the first and the last sample get the rate zero,
+        so that their encoders' noise is not added to the motion.
         """
         standing_rad = self._standing_rad(float(time_s[0]), float(time_s[-1]))
         return self._mean_rates(time_s, _averaging_time(time_s), standing_rad)

@@ -21,9 +21,9 @@ MIN_ROWS = 20
 def find_interpolated(time_s: Array, quaternions: Array) -> NDArray[np.bool_]:
     """Return a mask (n,) of the quaternions (n, 4) interpolated between others; all False for a measured motion.
 
-    Unit quaternions lie on a sphere, and an interpolated row lies on a chord inside it. The fastest rows, where the
-    chords are longest, show whether the file contains such rows: they lie on the chord between their neighbours, or
-    they are too short. The mask has the rows on a chord, and those that are too short for a unit quaternion.
+    Unit quaternions lie on a sphere, and an interpolated row lies on a chord inside it. So it lies on the chord between
+    its neighbours, or is too short for a unit quaternion. Chords are longest in the fastest motion, so the fastest rows
+    decide whether the file contains interpolated rows. If it does, all rows with either property are marked.
     """
     interpolated = np.zeros(len(quaternions), dtype=np.bool_)
     if len(quaternions) < MIN_ROWS:
@@ -43,11 +43,11 @@ def find_interpolated(time_s: Array, quaternions: Array) -> NDArray[np.bool_]:
 
 
 def _measure_chords(time_s: Array, quaternions: Array) -> tuple[Array, Array]:
-    """Return distances (2, n − 2) of rows from the chord between their neighbours, and distances of unit quaternions.
+    """Return the distances (2, n − 2) of rows from the chord between their neighbours, and those of unit quaternions.
 
-    Both arrays begin with the distances from the point of the chord that an interpolation from row to row gives; their
-    second row is for an interpolation over time. At the fraction w of a chord of length d, a unit quaternion has the
-    distance w (1 − w) d² / 2.
+    In both arrays, row 0 is for an interpolation from row to row, which reaches the middle of the chord, and row 1 for
+    an interpolation over time. A distance is that from the point on the chord that the interpolation gives. At the
+    fraction w of a chord of length d, a unit quaternion has the distance w (1 − w) d² / 2.
     """
     before, rows, after = quaternions[:-2], quaternions[1:-1], quaternions[2:]
     steps_s = np.diff(time_s)

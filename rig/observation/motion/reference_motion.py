@@ -42,7 +42,7 @@ class KnownMotion(Protocol):
 
 
 def closely_followed(states_s: Array, close: NDArray[np.bool_], time_s: Array) -> NDArray[np.bool_]:
-    """Return a mask of the times (n,) that lie between two states (m,) marked as `close` (m − 1,)."""
+    """Return a mask of the times (n,) in those intervals between successive states (m,) that `close` (m − 1,) marks."""
     interval = np.searchsorted(states_s, time_s, side="right") - 1
     inside = (interval >= 0) & (interval < len(close))
     covered: NDArray[np.bool_] = inside & close[np.clip(interval, 0, len(close) - 1)]
@@ -50,7 +50,7 @@ def closely_followed(states_s: Array, close: NDArray[np.bool_], time_s: Array) -
 
 
 def check_span(time_s: Array, what: str) -> None:
-    """Raise Fault `impossible_times`, about `what`, if rising times (n,) span too long a time."""
+    """Raise Fault `impossible_times` if rising times (n,) span too long a time; the message calls them `what`."""
     span_s = time_s[-1] - time_s[0]
     if span_s > MAX_SPAN_S:
         raise Fault(

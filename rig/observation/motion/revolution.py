@@ -28,7 +28,7 @@ class Revolution:
     - `axis_errors` (13, 3): the axis' change per radian of each arm error (`rig.motion.geometry.AXIS_ERRORS`).
     - `attitude` (3, 3): transforms a vector from the arm's base frame to the flange's, at the start.
     - `arm_m` (3,): a vector from the joint's axis to the flange's origin, in the flange's frame.
-    - `station`: the joint, from 0 at the base, and the pose in which it turned.
+    - `station`: the joint, from 0 at the base, then the angles, rad, of the other joints, rounded.
     - `uneven`: whether the encoder errs by a degree, so that the shaft's angle is known only over whole turns.
     """
 

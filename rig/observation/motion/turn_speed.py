@@ -33,8 +33,8 @@ def turn_speed(time_s: NDArray[np.float64], q_rad: NDArray[np.float64]) -> TurnS
     `time_s` (n,): rising; `q_rad` (n,): the encoder's readings without the ramps, continuous over several turns. T is
     the mean time between readings one turn apart. For example, a 12-bit encoder with a noise of 0.06° that is read at
     100 Hz over 1¼ turns at 60°/s determines T to 2e-5. The standard deviation of T follows from the scatter of the
-    readings' differences over one turn, if the noise of single readings is white. Raise Fault `turn_too_short` unless
-    readings cover a turn and `MIN_PAIRS` readings more, or if the shaft stands still.
+    readings' differences over one turn, if the noise of single readings is white. Raise Fault `turn_too_short` if the
+    shaft stands still, or if there are fewer than `MIN_PAIRS` readings beyond one turn.
     """
     far_rad = abs(float(q_rad[-1] - q_rad[0])) if len(q_rad) > MIN_PAIRS else 0.0
     if far_rad <= TURN_RAD:

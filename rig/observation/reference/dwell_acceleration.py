@@ -29,7 +29,7 @@ LEAVING_S = 0.05  # before a dwell's end: the board's times include the gyroscop
 
 @dataclass(frozen=True, slots=True)
 class DwellReading:
-    """The mean reading, in m/s², in the dwell `index` of the procedure.
+    """The mean reading, in m/s², in one dwell; `index` is the dwell's index in the procedure.
 
     `attitude` (3, 3) is the mean rotation from the arm's base frame into the flange's, weighted like the readings. The
     `window` is in controller times.
@@ -69,16 +69,16 @@ def read_each_dwell(
 
 
 def accelerations(stream: Stream, inside: slice) -> Array:
-    """Return accelerations (n, 3), m/s², of the samples `inside`."""
+    """Return the accelerations (n, 3), m/s², in the samples of the slice `inside`."""
     return stream.correct_temperature(
         ACCELERATION, stream.sensor.channel(ACCELERATION).values(stream.raw[inside]), inside
     )
 
 
 def check_acceleration(stream: Stream, inside: slice, where: str, *, turning: bool = False) -> None:
-    """Raise Fault `saturation` or `stuck_sensor` for the accelerometer's samples `inside`.
+    """Raise Fault `saturation` or `stuck_sensor` if the accelerometer's samples in the slice `inside` are unusable.
 
-    One axis with equal readings suffices for `stuck_sensor` in a rotation (`turning`); at rest, all three are needed.
+    `stuck_sensor` means that readings are all equal: on one axis while the arm is `turning`, at rest on all three.
     """
     channel, samples = stream.sensor.channel(ACCELERATION), stream.raw[inside]
     counts, saturated = channel.counts(samples), channel.is_saturated(samples)
@@ -106,7 +106,10 @@ def _is_noisy(stream: Stream) -> bool:
 def _dwell_reading(
     run: RunData, stream: Stream, motion: ArmMotion, finished: FinishedDwell, settings: ObservationThresholds
 ) -> DwellReading:
-    """Return a dwell's mean acceleration and attitude, with weights by which the arm's oscillation adds no noise."""
+    """Return a dwell's mean acceleration, and the mean attitude with the same weights.
+
+    The arm's oscillation changes both means alike, so it adds no noise.
+    """
     dwell, window = finished.dwell, trim_dwell(run, finished).window
     where = f"dwell {dwell.index} ({dwell.name})"
     inside = slice_time(stream, window.start_s, window.end_s)

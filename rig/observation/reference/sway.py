@@ -49,6 +49,7 @@ def sway_acceleration(
     if np.sum(smooth_m**2) <= MIN_POWER_RATIO * columns.shape[1] * noise_m2:
         return np.zeros((len(time_s), 3))
     orders = np.r_[0, np.repeat(np.arange(1, HALF_WAVES + 1), 2)]
+    # The second derivative of a wave of angular frequency ω is the wave times −ω².
     curvatures = -_half_waves((time_s - start_s) / (end_s - start_s)) * (np.pi * orders / (end_s - start_s)) ** 2
     return np.asarray(np.einsum("nij,nj->ni", motion.attitudes(time_s), curvatures @ coefficients), dtype=np.float64)
 

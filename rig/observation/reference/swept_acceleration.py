@@ -24,7 +24,8 @@ class SweptAcceleration:
 
     The angle counts from the turn's start, where `attitude` (3, 3) transforms a vector from the arm's base frame to the
     flange's. In the flange's frame, `axis_flange` (3,) is the unit vector of the joint's positive rotation, and `arm_m`
-    (3,) leads from the axis to the flange's origin. `station`: the `joint`, from 0 at the base, and its pose.
+    (3,) leads from the axis to the flange's origin. `station`: the `joint`, from 0 at the base, then the other joints'
+    angles, rad, rounded.
     """
 
     sweep: int
@@ -62,6 +63,7 @@ def swept_acceleration(
     swayed = sway_acceleration(motion, sweep.joint, pose_rad, time_s, window_s=window_s, extension_m=extension_m)
     arm_m = motion.mount @ flange_arm(pose_rad, sweep.joint, motion.kinematics)
     centripetal = turn.speed_rad_s**2 * (np.outer(axis, axis) - np.eye(3)) @ (arm_m + motion.mount @ extension_m)
+    # The sway also tilts the sensor against the centripetal acceleration of the turn.
     swayed += (attitudes @ steady.swapaxes(1, 2) - np.eye(3)) @ centripetal
     acceleration = estimate_acceleration(partial(motion.angle, sweep), time_s, sweep.speed_rad_s)
     harmonic = first_harmonic(

@@ -16,28 +16,29 @@ MIN_UNPREDICTED = 1e-12  # fraction of the sum of squares; less remains if resid
 
 @dataclass(frozen=True, slots=True)
 class VarianceInflation:
-    """The `factor` on the variance of a mean of residuals, and the degrees of freedom of that variance."""
+    """The `factor` that multiplies the variance of a mean of residuals, and the degrees of freedom of the product."""
 
     factor: float
     dof: float
 
 
 def correlation_inflation(residuals: Array) -> float:
-    """Return the factor ≥ 1 on the variance of a mean of residuals (n,): 1 + 2 Σ ρ, with their lag correlations ρ.
+    """Return the factor, at least 1, by which correlations of residuals (n,) increase the variance of their mean.
 
-    Return 1 unless the correlations are significant together (Box–Pierce), so that white noise is not inflated.
+    It is 1 + 2 Σ ρ, summed over the lags, with the correlation ρ at each lag. Return 1 unless the correlations are
+    significant together (Box–Pierce), so that white noise is not inflated.
     """
     rho = _correlations(residuals)
     return 1.0 if rho is None else max(1.0, 1 + 2 * float(rho.sum()))
 
 
 def fit_noise_factor(residuals: Array) -> float:
-    """Return the factor on a mean's variance from an autoregressive model, below 1 if residuals are mostly vibration.
+    """Return the variance of a mean of residuals (n,), relative to that of white noise, by an autoregressive model.
 
-    Over many periods a vibration averages out, but the sum of its estimated correlations does not show that. So the
-    variance of a long mean is taken from the model's spectrum at zero frequency. This is var(e) / (1 − Σ a)², with the
-    coefficients a and innovations e.
-    Akaike's criterion selects the order.
+    The white noise has the same scatter. The result is below 1 if the residuals are mostly vibration. Over many periods
+    a vibration averages out, but the sum of its estimated correlations does not show that. So the variance of a long
+    mean is taken from the model's spectrum at zero frequency. This is var(e) / (1 − Σ a)², with the coefficients a and
+    innovations e. Akaike's criterion selects the order.
     """
     return fit_autoregression(residuals).factor
 
@@ -86,7 +87,7 @@ def _autoregression(products: Array, count: int, memory: int) -> tuple[float, fl
 
 
 def _products(residuals: Array, memory: int) -> Array:
-    """Return sums (memory + 1, memory + 1) of products of residuals (n,) up to `memory` steps apart, oldest first."""
+    """Return the matrix (memory + 1, memory + 1) of the sums Σ r[t + i] r[t + j] over t, for residuals r (n,)."""
     lagged = np.array([residuals[lag : len(residuals) - memory + lag] for lag in range(memory + 1)])
     products: Array = lagged @ lagged.T
     return products

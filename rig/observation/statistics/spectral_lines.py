@@ -33,7 +33,7 @@ EMPTY: Array = np.zeros(0)
 class LineSearch:
     """The criteria of a spectral line.
 
-    - `stands_out`: the line's power exceeds this multiple of the median power around it, and of `floor`.
+    - `stands_out`: the factor by which a line's power exceeds the median power around it, and `floor`.
     - `floor`: the median power of the readings if lines are sought in quieter data, such as encoder rates; else 0.
     - `slowest`: the least number of cycles in all readings; `sidebands`: the number of a line's sidebands (`waves`).
     - `most`: the largest number of lines, previous ones included.
@@ -101,8 +101,8 @@ def waves(cycles: Array, fraction: Array, sidebands: int = SIDEBANDS) -> Array:
 
     A line also has two linearly growing columns, for a vibration that begins or ends, and sidebands up to `sidebands`
     cycles above and below it. One sideband on either side is needed because a rotating sensor measures a vibration of
-    the room one cycle per turn above and below the vibration's own frequency. For further sidebands see
-    `rig.observation.motion.revolution.Revolution`.
+    the room one cycle per turn above and below the vibration's own frequency. More are needed if the speed varies
+    within a turn (`rig.observation.motion.revolution.Revolution`).
     """
     line, turn = (_rotate(2 * np.pi * np.outer(number, fraction)) for number in (cycles, range(1, sidebands + 1)))
     shifted = [line * shift for once in turn for shift in (once.conj(), once)]

@@ -76,7 +76,11 @@ def bridge_spikes(time_s: Array, rates: Array, spikes: NDArray[np.intp]) -> Arra
 
 
 def _changes_around(rates: Array) -> Array:
-    """Return for each of the rates (n, 3) the largest change (n,) from one to the next of the four rates around it."""
+    """Return how much the rates around each of the rates (n, 3) change, as an array (n,).
+
+    It is the largest difference, on any axis, from one to the next of the two rates before and the two rates after. The
+    result is 0 for the first two and the last two rates.
+    """
     steps, across = np.abs(np.diff(rates, axis=0)).max(axis=1), np.abs(rates[2:] - rates[:-2]).max(axis=1)
     changes = np.zeros(len(rates))
     changes[2:-2] = np.maximum(np.maximum(steps[:-3], steps[3:]), across[1:-1])

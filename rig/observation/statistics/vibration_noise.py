@@ -41,7 +41,7 @@ def average_standstill(readings: Array, time_s: Array, window: Window, steps: St
 
 
 def line_columns(residuals: Array) -> Array:
-    """Return columns (n, 8 k), eight for each of the k spectral lines in residuals (n, 3) of a rotating sensor."""
+    """Return columns (n, 8 k) of the k spectral lines in residuals (n, 3) of a rotating sensor, eight for each line."""
     return _columns(residuals, LineSearch())
 
 

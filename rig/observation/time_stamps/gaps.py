@@ -28,7 +28,10 @@ def hidden_angles_rad(time_s: Array, readings: Array, gaps: NDArray[np.intp]) ->
 
 
 def find_hiding_gaps(time_s: Array, readings: Array, gaps: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return the `gaps` (k,) that cannot be interpolated. Arguments are as for `hidden_angles_rad`."""
+    """Return those of the steps `gaps` (k,) that may hide too much rotation to be interpolated.
+
+    `readings` (n, 3) are rates at rising times (n,); a step has the number of its first reading.
+    """
     return np.asarray(gaps[hidden_angles_rad(time_s, readings, gaps) > MAX_HIDDEN_RAD], dtype=np.intp)
 
 

@@ -97,7 +97,10 @@ class Sampling:
         return np.concatenate([[0], np.cumsum(1 + self.missing)])
 
     def count_expected(self, time_s: Array, windows_s: Array) -> Array:
-        """Return the number of readings, including missing ones, in each of `windows_s` (k, 2), from times (n,)."""
+        """Return the number (k,) of readings in each of `windows_s` (k, 2) if none were missing.
+
+        The readings were taken at times (n,). They are assumed to continue before and after these times.
+        """
         beyond_s = np.minimum(windows_s - time_s[0], 0.0) + np.maximum(windows_s - time_s[-1], 0.0)
         numbers = np.interp(windows_s, time_s, self.numbers) + beyond_s / self.interval_s
         return np.asarray(numbers[:, 1] - numbers[:, 0], dtype=np.float64)
@@ -157,7 +160,10 @@ def _is_misleading(time_s: Array, interval_s: float, resolution_s: float) -> boo
 
 
 def _has_late(time_s: Array, single: _PeriodCandidate) -> bool:
-    """Return whether readings were late rather than lost: a late one makes a gap, and short steps after the gap."""
+    """Return whether readings were late rather than lost.
+
+    A late reading makes a gap before it and short steps after it, whereas a lost one makes only a gap.
+    """
     return bool(np.count_nonzero(np.diff(time_s) < SHORT_STEP * single.interval_s) > MAX_SHORT_RATIO * single.gap_count)
 
 
@@ -169,10 +175,9 @@ def _list_wider(time_s: Array) -> list[_PeriodCandidate]:
 
 
 def _select_candidate(candidates: Sequence[_PeriodCandidate], typical_s: float) -> _PeriodCandidate | None:
-    """Return the first of the `candidates` that fits with few gaps, or None.
+    """Return the narrowest of the `candidates` that fits with few gaps, or None.
 
-    They are sorted by width, the number of readings in a packet: a wide packet hides losses. `typical_s` is the typical
-    interval between readings.
+    The candidates are sorted by width, narrowest first. `typical_s` is the typical interval between readings.
     """
     # A much shorter interval is one inside a burst; with it the time between bursts would look like a gap.
     fitting = [
@@ -200,7 +205,10 @@ def find_typical_interval_s(time_s: Array) -> float:
 
 
 def _count_missing(time_s: Array, width: int, quantile: float) -> _PeriodCandidate:
-    """Return the interval, and the number of readings missing in each step, if they arrive in packets of `width`."""
+    """Return the interval, and the number of readings missing in each step, if readings arrive in packets of `width`.
+
+    The search for the interval starts at this `quantile` of its estimates from a few packets each.
+    """
     steps_s, numbers = np.diff(time_s), np.arange(len(time_s))
     interval_s, last_s = _interval_quantile(time_s, max(8, 4 * width), quantile), 0.0
     missing, fit = np.zeros(len(steps_s), dtype=np.intp), 0.0

@@ -87,14 +87,14 @@ class _UnorderedLog:
     findings: tuple[StampFinding, ...] = ()
 
     def select(self, kept: NDArray[np.bool_], reason: str) -> "_UnorderedLog":
-        """Return the log with only the rows `kept`, and note the `reason` if any row is left out."""
+        """Return the log with only the rows `kept`; if others are left out, a finding with the `reason` is added."""
         if kept.all():
             return self
         finding = self._describe(~kept, reason, left_out=True)
         return _UnorderedLog(self.rows[kept], self.stamps_s[kept], self.readings[kept], (*self.findings, finding))
 
     def restamp(self, stamps_s: Array, changed: NDArray[np.bool_], reason: str) -> "_UnorderedLog":
-        """Return the log with new stamps for some rows."""
+        """Return the log with new stamps for the rows `changed`, and with a finding that states the `reason`."""
         finding = self._describe(changed, reason, left_out=False)
         return replace(self, stamps_s=stamps_s, findings=(*self.findings, finding))
 
