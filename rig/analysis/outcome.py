@@ -80,7 +80,7 @@ class Outcome:
     - detection_limits: the detection limits of the gyroscopes' checks.
     - reference_detection_limits: the detection limits of the checks of accelerometers and magnetometers.
     - external: the results of external recordings; their gyroscopes are in results too.
-    - installed_kinds: the results of the solvers of installed kinds.
+    - installed_kinds: the results for sensors of kinds that plug-ins add and solve.
     - mounts: the item's mount in each stage after the first.
     - polynomials: those of a calibration over temperature; all other results then refer to the reference temperature.
     """

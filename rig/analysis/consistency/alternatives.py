@@ -152,6 +152,6 @@ def repeat_per_axis(columns: Array) -> Array:
 
 
 def split_per_axis(columns: Array) -> Array:
-    """Return columns (3, N, 3) from `columns` (N, 3), of which column i acts on axis i and is zero on the others."""
+    """Return three columns (3, N, 3) of readings by axis; the last index i selects `columns[:, i]`, on axis i alone."""
     stacked: Array = np.einsum("ij,ni->inj", np.eye(3), columns)
     return stacked

@@ -9,10 +9,11 @@ Each check tests the columns of one fault. Without the fault, the χ² that the 
 freedom as there are columns. The bias process is estimated from residuals within sweeps and between rests, so that a
 disturbed sweep does not mask itself.
 
-A ripple of the arm's rate that is faster than the samples and states may shift the mean reading of a transfer, although
-the recorded states do not show it. So the unexplained variance of the transfers is inflated until their residuals agree
-with it, after a fit of all changes from quarter to quarter of the recording. A transfer that still is an outlier gets a
-mean of its own, so that it does not affect the tests.
+Transfers, the motions between sweeps, are segments too. A ripple of the arm's rate that is faster than the samples and
+states may shift the mean reading of a transfer, although the recorded states do not show it. So a model is fitted whose
+parameters may change from quarter to quarter of the recording, and the variance of the transfers is increased until it
+agrees with the residuals of that model. A transfer that still is an outlier gets a mean of its own, so that it does not
+affect the tests.
 """
 
 from collections.abc import Iterator, Sequence
@@ -307,9 +308,10 @@ def _test_bias_jump(
 ) -> Statistic | None:
     """Return the χ² of the largest bias jump between two rests, beyond drift, and its critical value.
 
-    Return None with fewer than two possible jumps, each at the end of a sweep between rests. Few rests determine the
-    drift poorly, so the critical value is from the F distribution, with one degree of freedom per possible jump.
-    Simulated random walks exceed this value about as often as the false-alarm probability states.
+    A jump is possible at the end of each sweep that lies between two rests. Return None if there are fewer than two.
+    Few rests determine the drift poorly, so the critical value is that of an F distribution, whose denominator has one
+    degree of freedom for each possible jump. Simulated random walks exceed the critical value about as often as the
+    false-alarm probability states.
     """
     steady_columns, steps = _steady_columns(segments), step_columns(segments)
     if len(steps) < 2:

@@ -46,7 +46,10 @@ def compare_dwell_halves(
 
 
 def _vibration_variances(differences: Array, noise: Array) -> Array:
-    """Return for each of N dwells the other dwells' mean square of `differences` (N, 3), minus the `noise` (3,)."""
+    """Return the variance of vibration for each of N dwells, as the other dwells show it.
+
+    It is the mean square of their `differences` (N, 3), minus `noise` (3,), the variance that noise gives these.
+    """
     beyond = (differences**2 - noise).mean(axis=1)
     others: Array = np.maximum((beyond.sum() - beyond) / max(len(beyond) - 1, 1), 0.0)
     return others

@@ -198,7 +198,9 @@ def _detection_limits(
 def _whiten_readings(readings: ReferenceModel, *, drifting: bool) -> WhitenedReference:
     """Return residuals and model columns with unit noise, in coordinates in which all errors are independent.
 
-    If `drifting`, the model includes a drift of the bias.
+    The independent errors are noise with the known errors, and the effects of the arm's attitude errors, whose variance
+    δ² is not known: `growth` is the variance of each coordinate at δ = 1. If `drifting`, the model includes a drift of
+    the bias.
     """
     theta, movement = readings.theta, readings.movement
     decoupled = decorrelate(

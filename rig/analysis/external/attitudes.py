@@ -78,7 +78,8 @@ def solve_placed(
     """Return the calibration of every recorded quantity of a sensor by `method`, or its Fault.
 
     If `method` is None, gyroscopes are solved by "increments", or by "maximum_likelihood" if the options state that
-    rates are exact (`exact_rates`); other sensors are solved by "attitude_weighted", which also replaces "increments".
+    rates are exact (`exact_rates`); other sensors are solved by "attitude_weighted", also if `method` is "increments".
+    Sensors of kinds that plug-ins add are solved by these, whatever the method.
     """
     any_mounting, exact_rates = options.any_mounting, options.exact_rates
 
@@ -98,6 +99,7 @@ def solve_placed(
             if quantity in solvers:
                 of_kind: OfKind = solvers[quantity](name, placements, site)
                 return of_kind
+        # Raises if the field's strength is not stated: this is named before the Fault of the placements.
         norm = gravity_reference(site) if quantity == ACCELERATION else field_reference(site, "--field-t, in tesla")
         if isinstance(placements, Fault):
             raise placements

@@ -250,7 +250,8 @@ def solve_swept(data: ExternalData, estimator: BySweeps | None) -> Estimate:
 def budget_of(solution: Estimate, data: ExternalData) -> Budget:
     """Return the budget of a `solution` of sweeps.
 
-    The contributors are the scatter of the means and the errors of the stated motion; a solution by turns has its own.
+    The contributors are the scatter of the means and the errors of the stated motion. A `TurnedSolution`, from stated
+    angles of rotation, already contains its budget.
     """
     if data.turned is None or not isinstance(solution, TurnedSolution):
         vector = solution if isinstance(solution, VectorSolution) else _vector(data)
@@ -329,7 +330,10 @@ def _gyroscope(item: Item, result: Result, clock: TimeBase | None) -> SensorResu
 
 
 def _describe_as_swept(result: Result) -> TurnedSolution:
-    """Return the solution in the form rate = scale × (reading + bias), which solutions of sweeps have too."""
+    """Return the solution in the form rate = scale × (reading + bias), which solutions of sweeps have too.
+
+    In the solution by attitudes the bias is the reading at rest, so its sign changes.
+    """
     solution, matrix = result.solution, result.solution.matrix
     axes = SensorAxes.from_matrix(matrix)
     of_matrix = np.r_[F, OFFSET]

@@ -42,7 +42,7 @@ def list_omitted(
 
 
 def notes_on_reading(read: ExternalReadings, samples: Samples) -> Iterator[str]:
-    """Yield notes for the user on the origin of the files' times, and on rows that were changed or left out."""
+    """Yield notes for the user: the instant from which times count, and rows that were changed or left out."""
     if read.note:
         yield read.note
     yield from samples.notes

@@ -81,7 +81,7 @@ def _rotation_in_stage(fit: VectorFit, index: int) -> tuple[Array, Array]:
 
     Both are in units of the stated standard deviation of a mount.
     """
-    size = len(fit.mounts)
+    size = len(fit.mounts)  # three for each later stage, and last the first stage's three
     pick = np.zeros((3, size))
     pick[:, 3 * index : 3 * index + 3] = np.eye(3)
     pick[:, size - 3 :] = -np.eye(3)

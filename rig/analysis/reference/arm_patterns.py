@@ -35,8 +35,8 @@ class StatedArm:
 
     - `arm`: the kinematics; `axis_deg`: the stated half-width of the errors of its angles.
     - `mounting` (3, 3): the nominal mounting of the sensor on the flange.
-    - `estimated_rad`: the standard deviation of the wrists' errors, estimated from the readings; if it is larger than
-      the stated one, it replaces that.
+    - `estimated_rad`: the standard deviation of the wrist joints' angle errors, estimated from the readings. If it is
+      larger than the standard deviation that `axis_deg` means, it is used instead.
     """
 
     arm: DenavitHartenberg

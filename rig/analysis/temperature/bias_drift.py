@@ -133,7 +133,7 @@ def _accelerations(recordings: Sequence[ObservedRun], name: str, sensor: Recorde
 
 
 def _rates(recordings: Sequence[ObservedRun], name: str, sensor: RecordedSensor) -> dict[int, DwellMean]:
-    """Return the gyroscope's mean in every dwell, by the dwell's index; it is that of the rest within the dwell."""
+    """Return the gyroscope's mean reading while the arm stands still in every dwell, by the dwell's index."""
     mounting = np.array(sensor.mounting)
     means = {}
     for recording in recordings:
