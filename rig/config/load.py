@@ -49,7 +49,7 @@ WHOLE_FILE_PROBLEMS = ("cannot be read: ", "is ")  # how a problem of the whole 
 class Loaded:
     """A valid configuration.
 
-    - `simulated`: whether the file has a `world:` section, which only the simulated laboratory reads, from `text`.
+    - `simulated`: whether the file has a `world:` section. Only the simulated laboratory reads this section.
     - `flash_file`: the file with the simulated board's memory, None without such a file.
     - `text`: the file as used, merged with base and overrides; `rig_text`: the same without the `world:` section, as
       recorded.

@@ -23,7 +23,7 @@ class FileEntries:
 
 
 def find_file_entries(history: History, name: str, content: bytes, anchor: tuple[int, str] | None) -> FileEntries:
-    """Return the entries of a file in the history; the file is found by its bytes or, a result.json, by its values.
+    """Return the entries of a file in the history. A file is found by its bytes, a result.json also by its values.
 
     `anchor` is the last line of the journal when the file was signed, None without a signature. Problems are
     `unknown_to_history` if the history does not have the file, `not_as_entered` if its rows have changed since their

@@ -27,7 +27,7 @@ def look(folder: Path) -> Mapping[str, object]:
 
 
 def main() -> None:
-    """Analyse the run folder for each line on standard input, until the input ends."""
+    """Analyse the run folder that the command names, again whenever a line comes on standard input, until it ends."""
     with suppress(OSError, AttributeError):
         os.nice(NICENESS)
     folder = Path(sys.argv[1])

@@ -90,7 +90,7 @@ def after_verdict(about: About, checks: Sequence[Check], *, passed: bool, stored
 
 
 def after_fault(command: str, *, repeats: bool) -> Row:
-    """Return the next step after a fault, in words and as a command."""
+    """Return the next step after a fault: words, and the `command`, which `repeats` refused sweeps or not."""
     return _next("Repeat the refused sweeps" if repeats else "After correcting it, continue", command)
 
 

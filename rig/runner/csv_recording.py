@@ -53,8 +53,8 @@ class RecordedFile:
 class ReadingsFile:
     """A CSV file of a sensor's readings in SI units, one per row, on the clock that stamped them.
 
-    A board's clock that follows its crystal (`follows_crystal`) counts too few microseconds, by the fraction
-    NOMINAL_DRIFT. The times are corrected for this.
+    `follows_crystal`: whether the stamps are of a board's clock that runs by its crystal, None without a board. Such a
+    clock counts too few microseconds, by the fraction NOMINAL_DRIFT; the times are corrected for this.
     """
 
     def __init__(self, path: Path, name: str, sensor: RecordedSensor, follows_crystal: bool | None = None) -> None:

@@ -129,7 +129,7 @@ def _check_sweeps(name: str, result: SensorResult, tested: TestResults) -> list[
 def _test_readings(
     name: str, recordings: Sequence[ObservedRun], segments: Segments, false_alarm_probability: float
 ) -> Mapping[str, Statistic]:
-    """Return the tests of a gyroscope's converter from its single readings, by the name of the check."""
+    """Return the tests of a gyroscope's analogue-to-digital converter, from single readings, by the check's name."""
     sensor = recordings[0].run.sensors[name]
     samples = [recording.run.samples[name] for recording in recordings]
     return converter_tests.judge_readings(

@@ -54,6 +54,7 @@ def stack_segments(windows: Sequence[SegmentedAverage], explained: VectorFit, si
     """
     inputs = explained.inputs
     placed = list(zip(windows, inputs.windows_s[:, 0], inputs.acceleration_m_s2, strict=True))
+    # began_s: the window's start by the clock of the first recording; sensed: the acceleration of the sensor in it.
     segments = [segment for window in windows for segment in window.segments]
     rates = [segment.rate_rad_s + segment.attitude @ inputs.earth_rate_rad_s for segment in segments]
     return Segments(

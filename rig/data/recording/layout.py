@@ -6,8 +6,8 @@
 - attributes of the file: `schema`, `config` (YAML), and in JSON `settings`, `provenance` and `turner`.
 
 External readings (schema "rig.files/1") have no `/samples` and no rows in `/states`, but the tables `/readings` and
-`/motion` (a float column each, by name; `rig.data.recording.motion_file`) and `elsewhere` (JSON: the item, and the kind
-of the motion).
+`/motion` (a float column each, by name; `rig.data.recording.motion_file`) the attribute
+`elsewhere` (JSON: the calibrated item, and how its motion is known).
 """
 
 from collections.abc import Mapping, Sequence

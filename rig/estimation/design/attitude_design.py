@@ -141,7 +141,7 @@ def _rms(variances: Array) -> float:
 
 
 def _ideal(reference: Array, order: Order) -> Array:
-    """Return the parameters (p,) of an ideal sensor: F = I, no bias, no nonlinearity, and the `reference`."""
+    """Return the parameters (p,) of the fit: those of an ideal sensor, with the matrix F = I, and the `reference`."""
     theta = np.zeros(18 if order == 2 else 15)
     theta[[0, 4, 8]] = 1.0
     theta[REFERENCE] = reference

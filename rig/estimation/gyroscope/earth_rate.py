@@ -252,7 +252,7 @@ def _check_identifiable(inputs: VectorInputs, directions: Array, gravity: Array 
 
 
 def _condition(inputs: VectorInputs, directions: Array, gravity: Array | None) -> tuple[refusals.Conditioning, int]:
-    """Return the conditioning of the design, in blocks of unit RMS, and the number of its columns.
+    """Return the conditioning of the design, whose blocks of columns are scaled to unit RMS, and the number of columns.
 
     The columns are those of the sensor's coefficients, for matrix, offset and, with `gravity`, g-sensitivity, and one
     for each of the `directions` (d, 3) of the Earth's rate.

@@ -37,13 +37,13 @@ class ValuesAtTemperature:
 
 @dataclass(frozen=True, slots=True)
 class OverTemperature:
-    """The polynomials k(T) and c(T) = Σ coefficient (T − reference)ⁿ, n from 0; c is part of the reading.
+    """A sensor with the reading input/k(T) + c(T); both are polynomials Σ coefficient (T − reference)ⁿ, n from 0.
 
     - `scale`, `bias` (4, 3): the coefficients of k and c, SI units per Kⁿ; `orders` of k and of c.
     - `range_c`: the only range in which both are valid. `zero` (3,): the readings at the reference for zero input.
     - `lag_s`, `lag_std_s`: the thermometer's lag and its standard deviation.
-    - `hysteresis`: scale and bias (6,) while warming minus the means of warming and cooling, in mid-range, and the
-      standard deviation of this difference; None with one direction only.
+    - `hysteresis`: two arrays (6,) for scale and bias in mid-range: the value while warming minus the mean of warming
+      and cooling, and the standard deviation of this difference. None if the temperature changed in one direction only.
     """
 
     reference_c: float

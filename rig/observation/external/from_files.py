@@ -1,4 +1,4 @@
-"""A recording of external readings, from a file of readings and usually one of their motion."""
+"""A recording of external readings, from a file of readings and usually a second file with the sensor's motion."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

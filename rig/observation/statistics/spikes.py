@@ -90,7 +90,7 @@ def _changes_around(rates: Array) -> Array:
 def _find_lone(axis: Array, changes: Array) -> NDArray[np.intp]:
     """Return the indices of the readings (n,) that deviate from their neighbours as a spike does.
 
-    `changes` (n,) are the changes of all axes around each reading.
+    `changes` (n,): how much the readings before and after each one differ, the largest of all axes.
     """
     deviation = np.zeros(len(axis))
     # The deviation from the cubic through the two readings before and the two after.

@@ -20,7 +20,8 @@ class PlannedAverage:
 
     - `rate_rad_s`: the flange's rate in its own frame, zero at rest.
     - `q_rad`: the arm's pose, for a sweep at its start.
-    - `middle_s`, `duration_s`: the middle of the averaging time, from the first step on, and its length.
+    - `middle_s`: the middle of the averaging time, counted from the start of the first step.
+    - `duration_s`: the length of the averaging time.
     - `on_the_way`: poses spaced evenly along an arc; empty for whole turns.
     """
 

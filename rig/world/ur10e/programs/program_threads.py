@@ -18,7 +18,7 @@ HAND_OVER_RAD_S2 = 4.0  # deceleration before a move that follows a killed one
 
 @dataclass(frozen=True, slots=True)
 class ScriptMove:
-    """A movej or, if `straight`, a movel to joint angles or, if `is_pose`, to a pose of the tool's frame.
+    """A movej, or a movel if `straight`. The target is joint angles, or a pose of the tool's frame if `is_pose`.
 
     Speed and acceleration are in rad/s and rad/s², for a straight move in m/s and m/s². `is_soft`: it starts gently.
     """
