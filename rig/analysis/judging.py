@@ -197,9 +197,9 @@ def _add_polynomials(
     add: Callable[[ResultT, "OverTemperature"], tuple[ResultT, "OverTemperature"]],
     polynomials: "Polynomials",
 ) -> tuple[dict[str, ResultT], "Polynomials"]:
-    """Return the results of a quantity, and all polynomials, after `add` has combined the uncertainty of both.
+    """Return the results of a quantity, and all polynomials, after each has got contributions to U from the other.
 
-    `add` takes and returns one sensor's result and the polynomials of this quantity.
+    `add` includes them in one sensor's result and in its polynomials of this quantity, and returns both.
     """
     settled = {name: add(results[name], fits[quantity]) for name, fits in polynomials.items() if quantity in fits}
     added = {name: result for name, (result, _) in settled.items()}

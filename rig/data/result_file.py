@@ -65,7 +65,7 @@ class CheckEntry(Entry):
       decision rule requires; false_acceptance_probability: probability that an accepted value is beyond the limit.
     - kind: conformity of a property of the item, or fitness of the measurement for use; sensor, quantity, parameter:
       the subject, if a single one; sweep: a sweep that contradicts the others; criterion: the name of the judged
-      quantity, null if the check's package does not state it.
+      quantity, null if the package that adds the check names none.
     """
 
     name: str

@@ -217,9 +217,10 @@ class _TurnerSearch:
         return candidates
 
     def select_endless(self, candidates: Sequence[Candidate]) -> Sequence[Candidate]:
-        """Return two runs of each family: the largest with the shortest rests, and the largest with the longest rests.
+        """Return runs that show whether a family can reach the uncertainty at all, however long a run may last.
 
-        Runs of more than `PREDICTED_REPEATS` repeats are not selected.
+        They are the runs with the most sweeps and repeats, at most `PREDICTED_REPEATS`, for each combination of the
+        shortest and the longest rests.
         """
         selected = {
             (candidate.family, candidate.rests_s): candidate

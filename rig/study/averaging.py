@@ -20,11 +20,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 NOISES_RAD_S = (0.01, 0.02, 0.035, 0.05, 0.07, 0.1, 0.15, 0.2)
-ORDERS = ("mean_then_square", "square_then_mean")
+ORDERS = ("mean_then_square", "square_then_mean")  # of averaging the readings and squaring them
 
 
 def study(settings: Settings) -> StudyReport:
-    """Simulate 30 gyroscopes × 500 runs at each noise level, with sweeps at 60°/s that are sampled at 200 Hz."""
+    """Compare the errors of a calibration by either order, squaring or averaging first, at each noise level.
+
+    30 gyroscopes are simulated, by default in 500 runs each, with sweeps at 60°/s that are sampled at 200 Hz.
+    """
     task = partial(_simulate_gyroscope, settings.runs or sim.RUNS)
     errors = np.concatenate(run_parallel(task, range(sim.SETS), settings), axis=2)  # (noises, orders, all runs, 6)
     rows: list[dict[str, Any]] = [

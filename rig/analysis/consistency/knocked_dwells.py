@@ -19,8 +19,8 @@ def compare_dwell_halves(
     """Return, under the check's name, the largest difference between the halves of a dwell, and its limit.
 
     The difference is the χ² of three axes. Short dwells are not tested; if all are short, there is no check.
-    `flicker_counts` is the Allan deviation of the bias' flicker, by which halves also differ; `steps` are those of the
-    counts.
+    `flicker_counts` is the Allan deviation of the bias' flicker, which makes halves differ too. `steps` are the
+    quantization steps of the counts.
     """
     from scipy.special import fdtri
 

@@ -57,7 +57,10 @@ def _budget(accelerometer: PlannedAccelerometer) -> Budget:
 
 
 def _new_fraction(stated: Uncertainty) -> float:
-    """Return the stated fraction of the attitude errors' variance that is new in each dwell, within the valid range."""
+    """Return the stated fraction of the attitude errors' variance that is independent in each dwell.
+
+    It is clipped to the range that the solution allows.
+    """
     fraction = stated.repeatability_deg**2 / max(
         stated.repeatability_deg**2 + stated.axis_deg**2, np.finfo(np.float64).tiny
     )

@@ -55,7 +55,10 @@ def arm_patterns(theta: Array, movement: Movement, postures: Sequence[Posture], 
 
 
 def list_arm_rotations(postures: Sequence[Posture], arm: DenavitHartenberg, mounting: Array) -> Array:
-    """Return `Movement.arm_turns` (18, 3 N + 10 M), for twist and zero errors of the wrists of 1 rad (std)."""
+    """Return `Movement.arm_turns` (18, 3 N + 10 M): the body's rotations in N dwells and M sweeps by 18 errors.
+
+    The errors are twists and zero offsets of the wrist joints, each with a standard deviation of 1 rad.
+    """
     rotations: Array = _error_fractions()[:, None] * _stack_rotations(postures, arm, mounting)
     return rotations
 

@@ -271,7 +271,7 @@ class SensorSection(Section):
     @field_validator("turntable")
     @classmethod
     def require_reference(cls, value: TurntableSection, info: ValidationInfo) -> TurntableSection:
-        """Refuse a given calibration for a sensor that is to be calibrated."""
+        """Refuse a stated calibration of a sensor that the run calibrates; only a reference may have one."""
         if info.data.get("role") == "calibrate":
             raise ValueError(
                 "only a sensor with role: reference has a calibration in the configuration; the run finds that of a "

@@ -2,12 +2,13 @@
 
     v_m = F (s + φ s²) + b + E ε + η,   ε ~ N(0, δ² I),   η ~ N(0, ζ² I)
 
-s is the reference in body axes; the parameters θ are the matrix F, the nonlinearity φ, the bias b and the reference. ε
-rotates the body (`rig.estimation.reference.attitude_error`) and does not change the norm of the reference. η changes
-the norm, for example by a bias that depends on stress or temperature, or by a local disturbance. Longer dwells reduce
-neither ε nor η. A solution from six faces has hardly any redundancy to separate ζ from δ. So θ and its covariance are
-averages over ζ and δ. The weights are the restricted likelihood times the prior, which is uniform in δ and half-Cauchy
-in ζ with a scale of a milli-g (Gelman, Bayesian Analysis 1 (2006) 515).
+v_m is the mean reading in a placement, and s the reference in body axes; the parameters θ are the matrix F, the
+nonlinearity φ, the bias b and the reference. ε is a small rotation of the body, with the effect E ε on the reading
+(`rig.estimation.reference.attitude_error`), and does not change the norm of the reference. η changes the norm, for
+example by a bias that depends on stress or temperature, or by a local disturbance. Longer dwells reduce neither ε nor
+η. A solution from six faces has hardly any redundancy to separate ζ from δ. So θ and its covariance are averages over ζ
+and δ. The weights are the restricted likelihood times the prior, which is uniform in δ and half-Cauchy in ζ with a
+scale of a milli-g (Gelman, Bayesian Analysis 1 (2006) 515).
 
 Rests in an unknown attitude determine ζ as well, because the reference's norm is the same in every attitude.
 """

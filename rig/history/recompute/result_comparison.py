@@ -187,7 +187,7 @@ class RecomputeOutcome:
 
     @property
     def same(self) -> bool:
-        """Whether all recordings were solved with the stated results."""
+        """Whether solving all recordings again gave the results in their result files."""
         return all(comparison.same for comparison in self.compared)
 
     @property

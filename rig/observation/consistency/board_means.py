@@ -4,8 +4,8 @@ The comparison shows an error that no residual shows: a mean reading that is pai
 
 Board and computer average the same samples, with different weights. The board's weights are equal over whole blocks of
 readings, so its window begins and ends a little before or after the turn; the computer's weights cancel the spectral
-lines that the computer found. So the computer's mean is converted to the rotation and the spectral lines in the board's
-window, and the board's average must agree with the result.
+lines that the computer found. So the computer's mean is corrected for the other rotation, and for the spectral lines,
+that the board's window contains. The board's average must agree with the corrected mean.
 """
 
 from collections.abc import Sequence

@@ -54,7 +54,10 @@ class Ripple:
 
 
 def draw_ripple(fraction: float, cycles_per_turn: Sequence[int], random: Random) -> Ripple:
-    """Return a random ripple with components of equal rate. Its RMS rate is `fraction` of the joint's rate."""
+    """Return a ripple of random phases, whose components have angular rates of equal amplitude.
+
+    The ripple's RMS rate is `fraction` of the joint's rate.
+    """
     if fraction == 0.0:
         return Ripple()
     rate = fraction * sqrt(2.0 / len(cycles_per_turn))
